@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: MIT
+// The bridge's only public entry: couples this solver with its partner in another process. The
+// verbs and their meaning are those of preCICE v3, so that an adapter written for one reads like
+// the other.
+//
+//   Participant bridge("fluid", config, out_dir);          //   solid: the same, with
+//   bridge.set_mesh(interface_mesh);                       //   read "force",
+//   bridge.initialize();                                   //   write "displacement", "velocity"
+//   while (bridge.is_coupling_ongoing()) {
+//     if (bridge.requires_writing_checkpoint()) saved = state;
+//     const double dt = bridge.max_time_step_size();
+//     bridge.read_data("displacement", dt, displacement);  // at the end of the step: current
+//     iterate bridge.read_data("velocity", dt, velocity); step(state, dt);
+//     bridge.write_data("force", nodal_forces);
+//     bridge.advance(dt);
+//     if (bridge.requires_reading_checkpoint()) state = saved;
+//     else if (bridge.is_time_window_complete()) output(state);
+//   }
+//   bridge.finalize();
+//
+// Fields: "displacement" [m] and "velocity" [m/s], solid -> fluid, mapped consistently (H x);
+// "force", nodal forces [N] (2-D: per metre of depth), fluid -> solid, mapped conservatively (H^T
+// F). All arrays hold dim components per node, node by node, in the order of the mesh given to
+// set_mesh.
+//
+// Scheme: serial, fluid first. Every failure (partner absent, dead, silent, with another case file;
+// data that are not finite; a window that does not converge) throws UserError and tells the
+// partner.
+#pragma once
+
+#include "bridge/base/config.hpp"
+#include "bridge/interface_mesh.hpp"
+#include "bridge/settings.hpp"
+#include "bridge/statistics.hpp"
+
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <string_view>
+
+namespace sluice::bridge {
+
+class Transport;
+
+class Participant {
+public:
+  /// `name` is "fluid" or "solid". Reads [bridge] and [case] of the case file; connects nothing
+  /// yet. The solid writes `out_dir`/coupling.csv (and balance.csv when totals are reported).
+  Participant(std::string name, const Config &config, const std::filesystem::path &out_dir);
+  /// For tests: speaks over `transport`, already connected, instead of a socket.
+  Participant(std::string name, const Config &config, const std::filesystem::path &out_dir,
+              std::unique_ptr<Transport> transport);
+  /// Without finalize (a throw passes through) the partner is sent an abort, best effort.
+  ~Participant();
+  Participant(const Participant &) = delete;
+  Participant &operator=(const Participant &) = delete;
+
+  /// The coupled surface in the reference configuration. Once, before initialize. Throws UserError
+  /// on an unusable mesh.
+  void set_mesh(InterfaceMesh mesh);
+  /// Connects (either program may start first), compares the case files, exchanges the meshes,
+  /// builds the map, exchanges initial data: write_data before this call sets it, else it is zero.
+  /// The solid's call returns when the fluid's first forces are there.
+  void initialize();
+
+  bool is_coupling_ongoing() const;
+  /// True after an advance that completed the window: the state is accepted.
+  bool is_time_window_complete() const;
+  /// What is left of the current window [s]; the whole window at its start.
+  double max_time_step_size() const;
+  /// True at the first iteration of a window until the next advance; only in an implicit scheme.
+  bool requires_writing_checkpoint() const;
+  /// True after an advance whose iteration did not converge: go back to the window's start.
+  bool requires_reading_checkpoint() const;
+
+  /// Own field at the end of this step. Throws UserError for a wrong size, a field that this side
+  /// does not write, or a value that is not finite (naming node and value).
+  void write_data(std::string_view field, std::span<const double> values);
+  /// The partner's field at `relative_time` [s] after the current time: in a window of length dt
+  /// 0 gives the value at its start, dt the current iterate at its end, linear in between. The
+  /// force at the start of the first window is the initial one (zero unless written).
+  void read_data(std::string_view field, double relative_time, std::span<double> values) const;
+
+  /// Ends a step of length dt <= max_time_step_size() [s]. At the end of the window exchanges data
+  /// with the partner and waits for it; before that (sub-steps) only moves the time on.
+  void advance(double dt);
+  /// Says goodbye. The partner's early end is an error until then.
+  void finalize();
+  /// Tells the partner why this side gives up. The caller then ends.
+  void abort(std::string_view message) noexcept;
+
+  /// Optional, after an advance that completed a window: this side's own sums over the interface
+  /// in that window. When both sides report, the solid compares them (balance.csv, statistics).
+  void report_totals(const InterfaceTotals &totals);
+
+  const InterfaceMesh &mesh() const;
+  const InterfaceMesh &partner_mesh() const; ///< valid after initialize
+  const BridgeSettings &settings() const;
+  const CaseSettings &case_settings() const;
+  const Statistics &statistics() const;
+  long time_window() const; ///< current window, counted from 1
+  int iteration() const;    ///< current iteration in the window, counted from 1
+  double time() const;      ///< [s] current time: window start plus completed sub-steps
+
+private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+/// Sums over the interface for report_totals. `positions` are the current node positions [m],
+/// `forces` the nodal forces [N], `increments` the window's displacement increments [m].
+InterfaceTotals interface_totals(int dim, std::span<const double> positions,
+                                 std::span<const double> forces,
+                                 std::span<const double> increments);
+
+} // namespace sluice::bridge
