@@ -162,8 +162,11 @@ std::size_t Config::array_size(std::string_view name) const {
 
 void Config::allow_tables(std::initializer_list<std::string_view> names) const {
   std::vector<std::string> known(names.begin(), names.end());
+  const auto is_known = [&](const std::string &path) {
+    return std::find(known.begin(), known.end(), path) != known.end();
+  };
   const auto check_table = [&](const toml::node &node, const std::string &path) {
-    if (std::find(known.begin(), known.end(), path) != known.end())
+    if (is_known(path) || is_known(path.substr(0, path.find('.')) + ".*"))
       return;
     const std::string near = nearest_word(path, known);
     const std::string origin = place(document_->name, node.source());

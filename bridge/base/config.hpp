@@ -112,7 +112,8 @@ public:
       all.push_back(read_element<Params>(name, k));
     return all;
   }
-  /// Throws for a top-level or nested table that is not among `names` ("fluid", "fluid.walls" ...).
+  /// Throws for a top-level or nested table that is not among `names` ("fluid", "fluid.walls" ...);
+  /// "fluid.*" stands for any table of one level below, which its owner checks.
   void allow_tables(std::initializer_list<std::string_view> names) const;
 
   bool has_table(std::string_view name) const;
