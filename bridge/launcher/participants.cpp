@@ -1,0 +1,85 @@
+// SPDX-License-Identifier: MIT
+#include "bridge/launcher/participants.hpp"
+
+#include <fmt/ranges.h>
+
+#include <array>
+#include <unistd.h>
+
+namespace sluice::launcher {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+struct Kind {
+  std::string_view table;
+  std::string_view program;
+  std::string_view build_folder; ///< where the build puts it, relative to the build's root
+};
+
+// The first one listed shows its progress on the terminal.
+constexpr std::array kinds{Kind{"fluid", "sluice-fluid", "fluid"},
+                           Kind{"solid", "sluice-solid", "solid-dealii"}};
+
+fs::path own_folder() {
+  std::error_code error;
+  const fs::path self = fs::read_symlink("/proc/self/exe", error);
+  check(!error, "sluice: cannot tell where this program lies (/proc/self/exe: {}); give --programs",
+        error.message());
+  return self.parent_path();
+}
+
+std::vector<fs::path> folders_to_search(const Kind &kind, const fs::path &given) {
+  if (!given.empty())
+    return {fs::absolute(given)};
+  const fs::path own = own_folder();
+  // <build>/bridge/launcher/sluice, when it runs from the build tree
+  return {own, own.parent_path().parent_path() / kind.build_folder};
+}
+
+fs::path find_program(const Kind &kind, const fs::path &given) {
+  std::vector<std::string> tried;
+  for (const fs::path &folder : folders_to_search(kind, given)) {
+    const fs::path candidate = folder / kind.program;
+    if (access(candidate.c_str(), X_OK) == 0 && fs::is_regular_file(candidate))
+      return candidate;
+    tried.push_back(candidate.string());
+  }
+  fail("[{}] needs the program {}, which is not there (looked for {}); build it "
+       "(CMake's summary says what was skipped and why) or give its folder with --programs",
+       kind.table, kind.program, fmt::join(tried, " and "));
+}
+
+struct CaseName {
+  std::string name;
+  double end_time_s = 0, time_step_s = 0, output_interval_s = 0; // the solvers read these
+  template <class Reader> void describe(Reader &read) {
+    read.required("name", name, "names the run folder and the ParaView file")
+        .check(!name.empty() && name.find('/') == std::string::npos,
+               "must be a name without a slash");
+    read("end_time_s", end_time_s, "the run ends here");
+    read("time_step_s", time_step_s, "length of a coupling window");
+    read("output_interval_s", output_interval_s, "between two pictures");
+  }
+};
+
+} // namespace
+
+Case read_case(const Config &config) {
+  // Each participant knows its own sub-tables.
+  config.allow_tables({"case", "bridge", "fluid", "fluid.*", "solid", "solid.*"});
+  return {config.read<CaseName>("case").name};
+}
+
+std::vector<Participant> participants_of(const Config &config, const fs::path &folder) {
+  std::vector<Participant> found;
+  for (const Kind &kind : kinds)
+    if (config.has_table(kind.table))
+      found.push_back({std::string(kind.table), find_program(kind, folder)});
+  check(!found.empty(), "{}: the case has no participant; give it a [fluid] or a [solid] table",
+        config.file_name());
+  return found;
+}
+
+} // namespace sluice::launcher

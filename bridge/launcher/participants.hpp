@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: MIT
+// Which programs a case needs. The tables of the case file decide: [fluid] starts sluice-fluid,
+// [solid] starts sluice-solid.
+#pragma once
+
+#include "bridge/base/config.hpp"
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace sluice::launcher {
+
+struct Participant {
+  std::string name;              ///< the table in the case file, the stem of its log and summary
+  std::filesystem::path program; ///< absolute path of an executable file
+};
+
+/// What the launcher itself needs from the case file.
+struct Case {
+  std::string name; ///< names the run folder and the ParaView file
+};
+
+/// The tables and the case's name; throws UserError for an unknown table or a missing name.
+Case read_case(const Config &config);
+
+/// The participants of the case in starting order. Programs are looked for in `folder` when it is
+/// given, otherwise beside this executable and in the build tree that it lies in.
+/// Throws UserError when the case has no participant or a program is not there.
+std::vector<Participant> participants_of(const Config &config, const std::filesystem::path &folder);
+
+} // namespace sluice::launcher

@@ -1,0 +1,229 @@
+// SPDX-License-Identifier: MIT
+// sluice: starts every participant of a case as a process of its own.
+//
+//   sluice run CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--threads N]
+//   sluice check CASE.toml [--set TABLE.KEY=VALUE]...
+//
+// Exit status: 0 complete, 1 failed, 2 wrong usage, 128 + signal when it was told to stop.
+#include "bridge/launcher/participants.hpp"
+#include "bridge/launcher/run_folder.hpp"
+#include "bridge/launcher/summary.hpp"
+#include "bridge/launcher/supervisor.hpp"
+
+#include <CLI/CLI.hpp>
+
+#include <cstdio>
+#include <cstdlib>
+#include <ctime>
+#include <sched.h>
+#include <unistd.h>
+
+namespace sluice::launcher {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int exit_failed = 1;
+constexpr int exit_usage = 2;
+
+struct Options {
+  std::string case_file;
+  std::vector<std::string> overrides;
+  std::string out;
+  std::string programs;
+  int threads = 0; ///< 0: every core that this process may use
+  double grace_s = Deadlines{}.grace_s;
+};
+
+int cores_available() {
+  cpu_set_t set;
+  return sched_getaffinity(0, sizeof set, &set) == 0 ? CPU_COUNT(&set) : 1;
+}
+
+void set_default(const char *name, const std::string &value) {
+  setenv(name, value.c_str(), /*overwrite=*/0);
+}
+
+/// Returns the number of threads that each participant gets.
+int prepare_environment(int threads) {
+  if (threads > 0) {
+    setenv("OMP_NUM_THREADS", std::to_string(threads).c_str(), 1);
+    setenv("DEAL_II_NUM_THREADS", std::to_string(threads).c_str(), 1);
+  }
+  set_default("OMP_NUM_THREADS", std::to_string(cores_available()));
+  // In a serial scheme one participant waits while the other computes: its threads must sleep soon.
+  set_default("OMP_WAIT_POLICY", "passive");
+  set_default("GOMP_SPINCOUNT", "10000");
+  // As root, Open MPI refuses to start unless it is told twice.
+  set_default("OMPI_ALLOW_RUN_AS_ROOT", "1");
+  set_default("OMPI_ALLOW_RUN_AS_ROOT_CONFIRM", "1");
+  return std::atoi(std::getenv("OMP_NUM_THREADS"));
+}
+
+std::vector<std::string> arguments_of(const Options &options) {
+  std::vector<std::string> arguments{options.case_file};
+  for (const std::string &text : options.overrides)
+    arguments.insert(arguments.end(), {"--set", text});
+  return arguments;
+}
+
+std::string now_utc() {
+  const std::time_t now = std::time(nullptr);
+  char text[32];
+  std::strftime(text, sizeof text, "%Y-%m-%dT%H:%M:%SZ", std::gmtime(&now));
+  return text;
+}
+
+std::string indented(const std::string &text) {
+  std::string out = "    ";
+  for (const char c : text)
+    out += c == '\n' ? "\n    " : std::string(1, c);
+  return out;
+}
+
+void report_failures(const RunOutcome &outcome, const Case &scene, const fs::path &folder) {
+  if (outcome.signal != 0)
+    fmt::print(stderr, "sluice: {} was stopped by signal {}\n", scene.name, outcome.signal);
+  else
+    fmt::print(stderr, "sluice: {} failed\n", scene.name);
+  for (const Outcome &participant : outcome.participants)
+    if (!participant.ok())
+      fmt::print(stderr, "  {}: {}\n{}\n", participant.participant, participant.how_it_ended(),
+                 indented(participant.message.empty() ? "(no message)" : participant.message));
+  fmt::print(stderr, "  output so far and the logs: {}\n", folder.string());
+}
+
+int run(const Options &options) {
+  const Config config = Config::load(options.case_file, options.overrides);
+  const Case scene = read_case(config);
+  const auto participants = participants_of(config, options.programs);
+  const fs::path folder =
+      fs::absolute(options.out.empty() ? fs::path("out") / scene.name : fs::path(options.out));
+  prepare_run_folder(folder, scene.name, options.case_file);
+
+  RunDescription description{scene.name, fs::absolute(options.case_file).string(),
+                             options.overrides, prepare_environment(options.threads), now_utc()};
+  std::vector<Command> commands;
+  for (const Participant &participant : participants) {
+    auto arguments = arguments_of(options);
+    arguments.insert(arguments.end(), {"--out", folder.string()});
+    commands.push_back({participant.name, participant.program, std::move(arguments),
+                        folder / (participant.name + ".log"),
+                        commands.empty() ? Shown::yes : Shown::no});
+  }
+  Deadlines deadlines;
+  deadlines.grace_s = options.grace_s;
+  const RunOutcome outcome = run_together(commands, deadlines);
+
+  const fs::path collection = combine_collections(folder, scene.name);
+  const bool completed = write_summary(folder, description, outcome);
+  if (!outcome.ok()) {
+    report_failures(outcome, scene, folder);
+    return outcome.signal != 0 ? 128 + outcome.signal : exit_failed;
+  }
+  if (!completed) {
+    fmt::print(stderr, "sluice: {} ended before its end time; see {}\n", scene.name,
+               (folder / "summary.json").string());
+    return exit_failed;
+  }
+  fmt::print("{}: complete in {:.1f} s, {}\n", scene.name, outcome.wall_time_s,
+             (collection.empty() ? folder / "summary.json" : collection).string());
+  return 0;
+}
+
+/// A folder of its own under the system's temporary one, gone at the end of the scope.
+class TemporaryFolder {
+public:
+  TemporaryFolder() {
+    std::string pattern = (fs::temp_directory_path() / "sluice-XXXXXX").string();
+    check(mkdtemp(pattern.data()) != nullptr, "sluice: cannot make a temporary folder {}", pattern);
+    path_ = pattern;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder &) = delete;
+  TemporaryFolder &operator=(const TemporaryFolder &) = delete;
+  const fs::path &path() const { return path_; }
+
+private:
+  fs::path path_;
+};
+
+void print_check(const Outcome &outcome) {
+  if (outcome.ok())
+    fmt::print("{}: OK\n", outcome.participant);
+  else
+    fmt::print(stderr, "{}: {}\n{}\n", outcome.participant, outcome.how_it_ended(),
+               indented(outcome.message.empty() ? "(no message)" : outcome.message));
+}
+
+int check_case(const Options &options) {
+  const Config config = Config::load(options.case_file, options.overrides);
+  read_case(config);
+  const auto participants = participants_of(config, options.programs);
+  prepare_environment(options.threads);
+
+  const TemporaryFolder logs;
+  std::vector<Command> commands;
+  for (const Participant &participant : participants) {
+    auto arguments = arguments_of(options);
+    arguments.emplace_back("--check");
+    commands.push_back({participant.name, participant.program, std::move(arguments),
+                        logs.path() / (participant.name + ".log"), Shown::no});
+  }
+  const RunOutcome outcome = run_together(commands, Deadlines{});
+  for (const Outcome &participant : outcome.participants)
+    print_check(participant);
+  if (!outcome.ok())
+    return outcome.signal != 0 ? 128 + outcome.signal : exit_failed;
+  fmt::print("{}: OK\n", options.case_file);
+  return 0;
+}
+
+void add_common_options(CLI::App &command, Options &options) {
+  command.add_option("CASE", options.case_file, "case file (.toml)")->required();
+  command
+      .add_option("--set", options.overrides, "TABLE.KEY=VALUE, overrides one key; may be repeated")
+      ->expected(1)
+      ->take_all();
+  command
+      .add_option("--threads", options.threads, "threads of each participant (default: every core)")
+      ->check(CLI::Range(1, 4096));
+  command.add_option("--programs", options.programs,
+                     "folder of the participants' programs (default: beside this one)");
+}
+
+} // namespace
+
+} // namespace sluice::launcher
+
+int main(int argc, char **argv) {
+  using namespace sluice::launcher;
+  CLI::App app("Starts every participant of a Sluice case, each as a process of its own.",
+               "sluice");
+  app.require_subcommand(1);
+  Options options;
+  CLI::App *run_command = app.add_subcommand("run", "run a case");
+  add_common_options(*run_command, options);
+  run_command->add_option("--out", options.out, "folder for the output (default: out/<case>)");
+  run_command
+      ->add_option("--grace", options.grace_s,
+                   "seconds that the others get to end by themselves when one has failed")
+      ->check(CLI::NonNegativeNumber);
+  CLI::App *check_command = app.add_subcommand("check", "check a case without computing anything");
+  add_common_options(*check_command, options);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError &error) {
+    return app.exit(error) == 0 ? 0 : exit_usage;
+  }
+  try {
+    return *run_command ? run(options) : check_case(options);
+  } catch (const std::exception &error) {
+    fmt::print(stderr, "sluice: {}\n", error.what());
+    return exit_failed;
+  }
+}
