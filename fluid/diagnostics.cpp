@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/diagnostics.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sluice::fluid {
+
+Integrals integrate(const FluidSolver &solver) {
+  const Points &points = solver.state.points;
+  const FluidParams &params = solver.params();
+  const Cloud &cloud = solver.cloud();
+  const CentreLine line(solver.walls);
+  const double area = params.spacing * params.spacing, mass = params.density * area;
+  Integrals total;
+  for (int i = 0; i < points.size(); ++i) {
+    const Vec<2> &u = points.velocity[i];
+    const Vec<2> x =
+        points.position[i] + 0.5 * solver.dt() * (u - points.previous_velocity[i]);
+    total.kinetic += 0.5 * mass * u.squaredNorm();
+    total.potential -= mass * params.gravity.dot(x);
+    total.momentum += mass * u;
+    total.volume += cloud.cell_area[i];
+    total.point_volume += area;
+    if (!line.exists() || !line.is_past(points.position[i])) {
+      total.tank_volume += cloud.cell_area[i];
+      total.tank_point_volume += area;
+    }
+    total.max_speed = std::max(total.max_speed, u.norm());
+    total.min_pressure = std::min(total.min_pressure, points.pressure[i]);
+    total.max_pressure = std::max(total.max_pressure, points.pressure[i]);
+  }
+  return total;
+}
+
+CentreLine::CentreLine(const Walls &walls) {
+  const std::size_t n = walls.coupled_vertices.size();
+  for (std::size_t k = 0; k < n / 2; ++k)
+    line_.push_back(0.5 * (walls.position[walls.coupled_vertices[k]] +
+                           walls.position[walls.coupled_vertices[n - 1 - k]]));
+}
+
+bool CentreLine::is_past(const Vec<2> &x) const {
+  if (x.y() < tip().y())
+    return x.x() > tip().x();
+  for (std::size_t k = 1; k < line_.size(); ++k) {
+    const Vec<2> &a = line_[k - 1], &b = line_[k];
+    if (x.y() <= a.y() && x.y() >= b.y() && a.y() > b.y())
+      return x.x() > b.x() + (x.y() - b.y()) / (a.y() - b.y()) * (a.x() - b.x());
+  }
+  return x.x() > line_.front().x();
+}
+
+double water_level(const Points &points, double x, double spacing) {
+  std::vector<double> heights;
+  for (const Vec<2> &p : points.position)
+    if (std::abs(p.x() - x) <= spacing)
+      heights.push_back(p.y());
+  std::sort(heights.begin(), heights.end());
+  double level = 0;
+  for (const double y : heights) {
+    if (y - level > 2 * spacing)
+      break;
+    level = y;
+  }
+  return heights.empty() ? 0.0 : level + 0.5 * spacing;
+}
+
+} // namespace sluice::fluid

@@ -1,0 +1,42 @@
+// SPDX-License-Identifier: MIT
+// Integral quantities of the fluid: what is watched, and checked against conservation.
+#pragma once
+
+#include "fluid/step.hpp"
+
+namespace sluice::fluid {
+
+/// Integral state at the end of a step, per metre of depth.
+struct Integrals {
+  double kinetic = 0;       // [J/m]
+  double potential = 0;     // [J/m], of gravity, zero at the origin
+  Vec<2> momentum{0, 0};    // [N s/m]
+  double volume = 0;        // [m^2], area inside the surface envelope: holes do not count
+  double point_volume = 0;  // [m^2], number of points times spacing^2
+  double tank_volume = 0;        // [m^2], envelope on this side of the coupled wall's centre line
+  double tank_point_volume = 0;  // [m^2], points there times spacing^2
+  double max_speed = 0;     // [m/s]
+  double min_pressure = 0, max_pressure = 0; // [Pa]
+};
+
+/// Positions are taken at the end of the step: stage position plus dt (u^{n+1} - u^n) / 2.
+Integrals integrate(const FluidSolver &solver);
+
+/// Centre line of a plate-like coupled wall whose outline runs down one face and up the other.
+class CentreLine {
+public:
+  explicit CentreLine(const Walls &walls);
+  bool exists() const { return !line_.empty(); }
+  /// True beyond the plate: past its face above the tip, past the tip below it.
+  bool is_past(const Vec<2> &x) const;
+  /// Free end [m].
+  Vec<2> tip() const { return line_.back(); }
+
+private:
+  std::vector<Vec<2>> line_; // from the clamp to the tip
+};
+
+/// Height of the connected water column at x [m]: its top point plus half a spacing.
+double water_level(const Points &points, double x, double spacing);
+
+} // namespace sluice::fluid

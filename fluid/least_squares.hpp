@@ -1,0 +1,68 @@
+// SPDX-License-Identifier: MIT
+// Weighted least squares around one point: the fit behind every operator.
+//
+//   minimise  sum_j W_ij (P_ij . c - (f_j - f_i))^2 + sum_b w_b (e_b . c - h g_b)^2
+//
+// with P = (qx, qy, qx^2, qx qy, qy^2), q = r / h, h the kernel radius: the value at the point is
+// met exactly; a wall adds a row for the normal derivative g at its projection. Any derivative is
+// linear in the data: with A = sum W P P^T + sum w e e^T and a functional d (for the Laplacian
+// d = (0, 0, 2, 0, 2) / h^2) the coefficients are W_ij P_ij . s and w_b h e_b . s, A s = d.
+// Exact for quadratic fields on any cloud with a regular A. Source: Liszka and Orkisz, Comput.
+// Struct. 11 (1980) 83, generalised finite differences; Neumann rows derived here.
+#pragma once
+
+#include "bridge/base/vec.hpp"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+
+namespace sluice::fluid {
+
+using Basis = Eigen::Matrix<double, 5, 1>;
+
+/// Quadratic basis at q = r / h.
+inline Basis quadratic_basis(const Vec<2> &q) {
+  return {q.x(), q.y(), q.x() * q.x(), q.x() * q.y(), q.y() * q.y()};
+}
+
+/// Coefficients of h n . grad(f) at q in the basis.
+inline Basis normal_derivative(const Vec<2> &q, const Vec<2> &n) {
+  return {n.x(), n.y(), 2 * q.x() * n.x(), q.x() * n.y() + q.y() * n.x(), 2 * q.y() * n.y()};
+}
+
+/// Moment matrix of the quadratic fit.
+class QuadraticFit {
+public:
+  void add(const Basis &row, double w) { moment_.noalias() += (w * row) * row.transpose(); }
+  /// False when the cloud does not determine a quadratic: a pivot below 1e-6 of the largest.
+  bool factorise() {
+    cholesky_.compute(moment_);
+    if (cholesky_.info() != Eigen::Success)
+      return false;
+    const auto pivots = cholesky_.matrixLLT().diagonal().array().square();
+    return pivots.minCoeff() > 1e-6 * pivots.maxCoeff();
+  }
+  Basis solve(const Basis &functional) const { return cholesky_.solve(functional); }
+
+private:
+  Eigen::Matrix<double, 5, 5> moment_ = Eigen::Matrix<double, 5, 5>::Zero();
+  Eigen::LLT<Eigen::Matrix<double, 5, 5>> cholesky_;
+};
+
+/// Second moment of the linear fit, in scaled coordinates q.
+class LinearFit {
+public:
+  void add(const Vec<2> &q, double w) { moment_.noalias() += (w * q) * q.transpose(); }
+  /// Inverse moment, or zero when the cloud does not determine a gradient.
+  Mat<2> inverse() const {
+    const double det = moment_.determinant(), trace = moment_.trace();
+    if (!(det > 1e-4 * trace * trace))
+      return Mat<2>::Zero();
+    return moment_.inverse();
+  }
+
+private:
+  Mat<2> moment_ = Mat<2>::Zero();
+};
+
+} // namespace sluice::fluid

@@ -1,0 +1,143 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/motion.hpp"
+
+#include "fluid/parallel.hpp"
+#include "fluid/weights.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sluice::fluid {
+
+void move_points(Points &points, double dt) {
+  for_each_point(points.size(), [&](int i) {
+    Vec<2> &u = points.velocity[i], &old = points.previous_velocity[i];
+    points.position[i] += dt * (1.5 * u - 0.5 * old) + points.shift[i];
+    u += points.shift_velocity[i];
+    old += points.shift_velocity[i];
+    points.shift[i].setZero();
+    points.shift_velocity[i].setZero();
+  });
+}
+
+namespace {
+
+// Two walls on opposite sides of a point leave each at most 0.45 of the gap as clearance.
+double clearance_between(const PointWalls &walls, double clearance) {
+  for (int k = 1; k < walls.count; ++k)
+    if (walls.projection[0].normal.dot(walls.projection[k].normal) < -0.5)
+      clearance = std::min(
+          clearance,
+          0.45 * std::max(walls.projection[0].distance + walls.projection[k].distance, 0.0));
+  return clearance;
+}
+
+struct Contact {
+  bool was_behind = false;
+  bool moved = false;
+};
+
+Contact resolve_contact(Vec<2> &x, Vec<2> &u, const Walls &walls,
+                        std::span<const int> candidates, double reach, double clearance) {
+  Contact contact;
+  constexpr int sweeps = 4;
+  for (int sweep = 0; sweep < sweeps; ++sweep) {
+    const PointWalls near = project_on_walls(walls, candidates, x, reach);
+    const double limit = clearance_between(near, clearance);
+    bool touched = false;
+    for (const Projection &p : near) {
+      if (p.distance >= limit * (1 - 1e-9))
+        continue;
+      contact.was_behind = contact.was_behind || (sweep == 0 && p.distance < 0);
+      touched = contact.moved = true;
+      x -= (limit - p.distance) * p.normal;
+      const double approach = p.normal.dot(u - wall_velocity(walls, p));
+      u -= std::max(approach, 0.0) * p.normal;
+    }
+    if (!touched)
+      break;
+  }
+  return contact;
+}
+
+} // namespace
+
+int keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
+                        const Cloud &cloud) {
+  const double clearance = params.wall_clearance * cloud.spacing;
+  const int n = static_cast<int>(cloud.wall_points.size());
+  return static_cast<int>(sum(n, [&](int k) {
+    const PointWalls &near = cloud.point_walls[k];
+    if (near.count == 0 || near.projection[0].distance >= clearance)
+      return 0.0;
+    const int i = cloud.wall_points[k];
+    const auto candidates = cloud.near_segments.near(cloud.grid.cell(points.position[i]));
+    const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
+                                            candidates, cloud.radius, clearance);
+    return contact.was_behind ? 1.0 : 0.0;
+  }));
+}
+
+void volume_restoring_divergence(const Points &points, const Cloud &cloud,
+                                 const MotionParams &params, double gravity,
+                                 std::span<double> divergence) {
+  const double volume = cloud.spacing * cloud.spacing;
+  const double rate = params.volume_rate * std::sqrt(gravity / cloud.spacing);
+  constexpr double largest_error = 0.3;
+  for_each_point(points.size(), [&](int i) {
+    divergence[i] = 0;
+    if (cloud.kind[i] != PointKind::interior)
+      return;
+    double area = cloud.cell_area[i], total = 1;
+    for (const int j : cloud.neighbours.of(i)) {
+      if (cloud.kind[j] != PointKind::interior)
+        continue;
+      const double q = (points.position[j] - points.position[i]).norm() / cloud.radius;
+      const double w = weight(std::min(q, 1.0));
+      area += w * cloud.cell_area[j];
+      total += w;
+    }
+    const double error = 1 - area / (total * volume);
+    divergence[i] = rate * std::clamp(error, -largest_error, largest_error);
+  });
+}
+
+namespace {
+
+Vec<2> push_apart(int i, const Points &points, const Cloud &cloud, double closest) {
+  Vec<2> push = Vec<2>::Zero();
+  for (const int j : cloud.neighbours.of(i)) {
+    const Vec<2> r = points.position[i] - points.position[j];
+    const double distance = r.norm();
+    if (distance < closest && distance > 1e-12)
+      push += 0.5 * (closest / distance - 1) * r;
+  }
+  return push;
+}
+
+} // namespace
+
+void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
+                std::span<const Mat<2>> velocity_gradient, double dt) {
+  const double closest = params.closest_pair * cloud.spacing;
+  const double longest = 0.1 * cloud.spacing;
+  for_each_point(points.size(), [&](int i) {
+    const Mat<2> &g = velocity_gradient[i];
+    const double strain_rate = (g + g.transpose()).norm() / std::sqrt(2.0);
+    const double fraction = std::min(params.regularity * strain_rate * dt, 0.5);
+    Vec<2> towards_centroid = cloud.centroid_offset[i];
+    const Vec<2> &n = cloud.surface_normal[i];
+    towards_centroid -= n.dot(towards_centroid) * n;
+    if (cloud.kind[i] == PointKind::thin)
+      towards_centroid.setZero();
+    Vec<2> shift = fraction * towards_centroid + push_apart(i, points, cloud, closest);
+    const double length = shift.norm();
+    if (length > longest)
+      shift *= longest / length;
+    points.shift[i] = shift;
+    points.shift_velocity[i] =
+        cloud.kind[i] == PointKind::interior ? Vec<2>(g * shift) : Vec<2>(Vec<2>::Zero());
+  });
+}
+
+} // namespace sluice::fluid

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: MIT
+// How points move: with the flow, never through a wall, and kept evenly spread without changing the
+// volume that they fill. All corrections are rates or thresholds: their effect does not grow with
+// the number of steps.
+#pragma once
+
+#include "fluid/cloud.hpp"
+#include "fluid/points.hpp"
+
+#include <span>
+
+namespace sluice::fluid {
+
+struct MotionParams {
+  /// Fraction of the way to the cell's centroid per unit of strain (dimensionless).
+  double regularity = 2.0;
+  /// Volume errors decay at this multiple of sqrt(g / spacing) (dimensionless).
+  double volume_rate = 0.3;
+  /// No pair of points stays closer than this many spacings.
+  double closest_pair = 0.7;
+  /// No point stays closer to a wall than this many spacings.
+  double wall_clearance = 0.25;
+};
+
+/// Advances the points by a step `dt` [s] with the second-order extrapolation of their velocity,
+/// x += dt (3 u^n - u^{n-1}) / 2, which from stage to stage is the trapezoidal rule; then applies
+/// the pending regularisation. (The cloud lives at the stage positions; derived here.)
+void move_points(Points &points, double dt);
+
+/// Puts points that are behind a wall or too close to it back to the clearance and removes their
+/// velocity towards it; between two opposite walls, to the middle. Needs the cloud's projections.
+/// Returns the number of points that were behind a wall.
+int keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
+                        const Cloud &cloud);
+
+/// Divergence that brings the cells back to their volume [1/s], zero at the free surface: the
+/// relative volume error, averaged over the neighbours, times volume_rate sqrt(g / spacing).
+void volume_restoring_divergence(const Points &points, const Cloud &cloud,
+                                 const MotionParams &params, double gravity,
+                                 std::span<double> divergence);
+
+/// Regularisation to be applied in the next move: towards the cell's centroid at a rate
+/// proportional to the local strain rate (along the surface only, at the free surface), and apart
+/// from a neighbour that is too close. Zero on a regular cloud and in a fluid at rest.
+void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
+                std::span<const Mat<2>> velocity_gradient, double dt);
+
+} // namespace sluice::fluid

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: MIT
+// The fluid's state: a value that can be copied. A coupling checkpoint is such a copy.
+#pragma once
+
+#include "bridge/base/vec.hpp"
+
+#include <cstdint>
+#include <vector>
+
+namespace sluice::fluid {
+
+/// The points that carry the fluid, one entry per point in every array, sorted by grid cell.
+struct Points {
+  std::vector<Vec<2>> position;          // [m]
+  std::vector<Vec<2>> velocity;          // [m/s], at the end of the last step
+  std::vector<Vec<2>> previous_velocity; // [m/s], one step earlier, carried by the point
+  std::vector<Vec<2>> shift;             // [m], regularisation to be applied in the next move
+  std::vector<Vec<2>> shift_velocity;    // [m/s], change of velocity along that shift
+  std::vector<double> pressure;          // [Pa], mean over the last step
+  std::vector<std::int32_t> id;          // stays with the point for its life
+  std::vector<std::uint8_t> at_surface;  // was at the free surface in the last step
+
+  int size() const { return static_cast<int>(position.size()); }
+};
+
+/// All that a step reads and writes between windows.
+struct FluidState {
+  Points points;
+  std::int64_t step = 0;           // steps completed
+  std::int64_t wall_returns = 0;   // points put back through a wall so far
+  std::int64_t outflow_points = 0; // points that left through the outlet so far
+  std::int64_t lost_points = 0;    // points that ended outside except through the outlet
+};
+
+} // namespace sluice::fluid

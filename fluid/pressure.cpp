@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/pressure.hpp"
+
+#include "fluid/parallel.hpp"
+#include "fluid/weights.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sluice::fluid {
+
+namespace {
+
+// Weight of a wall row: that of a neighbour at no distance.
+constexpr double wall_weight = 1.0;
+// Points farther from a wall than this, in spacings, have no row for it: they see enough neighbours.
+constexpr double wall_row_reach = 1.5;
+
+/// All that the row of one point is made from, in scaled coordinates.
+struct Stencil {
+  int i;
+  double h;                        // kernel radius [m]
+  std::span<const int> neighbours;
+  const PointWalls *walls;         // or nullptr
+  bool open;                       // has a free side: a zero half a spacing outside
+  Vec<2> open_side;                // q of that zero
+};
+
+double reach_of_rows(const Cloud &cloud) { return wall_row_reach * cloud.spacing; }
+
+template <class Visit> void for_each_wall_row(const Stencil &s, const Cloud &cloud, Visit &&visit) {
+  if (!s.walls)
+    return;
+  for (int m = 0; m < s.walls->count; ++m)
+    if (s.walls->projection[m].distance < reach_of_rows(cloud))
+      visit(m, s.walls->projection[m]);
+}
+
+// A surface point that lies on a wall with its back (a film one point deep) takes the gradient from
+// the wall's datum instead of the zero above it.
+bool lies_on_wall(const Stencil &s, const Cloud &cloud) {
+  bool lies = false;
+  for_each_wall_row(s, cloud, [&](int, const Projection &p) {
+    lies = lies || p.normal.dot(cloud.surface_normal[s.i]) < -0.5;
+  });
+  return lies;
+}
+
+Stencil stencil_of(int i, const Cloud &cloud) {
+  const Vec<2> open_side = 0.5 * cloud.spacing / cloud.radius * cloud.surface_normal[i];
+  Stencil s{i, cloud.radius, cloud.neighbours.of(i), cloud.walls_of(i), false, open_side};
+  s.open = cloud.kind[i] == PointKind::surface && !lies_on_wall(s, cloud);
+  return s;
+}
+
+struct Neighbour {
+  int j;
+  Vec<2> q;
+  double w;
+};
+
+template <class Visit>
+void for_each_neighbour(const Stencil &s, const Points &points, Visit &&visit) {
+  const Vec<2> &x = points.position[s.i];
+  for (const int j : s.neighbours) {
+    const Vec<2> q = (points.position[j] - x) / s.h;
+    visit(Neighbour{j, q, weight(std::min(q.norm(), 1.0))});
+  }
+}
+
+// --- fits -----------------------------------------------------------------------------------
+
+QuadraticFit quadratic_fit(const Stencil &s, const Points &points, const Cloud &cloud) {
+  QuadraticFit fit;
+  for_each_neighbour(s, points,
+                     [&](const Neighbour &n) { fit.add(quadratic_basis(n.q), n.w); });
+  for_each_wall_row(s, cloud, [&](int, const Projection &p) {
+    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+    fit.add(normal_derivative(q, p.normal), wall_weight);
+  });
+  return fit;
+}
+
+/// Functionals of d/dx, d/dy from the linear fit with wall rows and the surface's zero.
+Eigen::Matrix<double, 5, 2> linear_gradient(const Stencil &s, const Points &points,
+                                            const Cloud &cloud) {
+  LinearFit fit;
+  for_each_neighbour(s, points, [&](const Neighbour &n) { fit.add(n.q, n.w); });
+  if (s.open)
+    fit.add(s.open_side, weight(s.open_side.norm()));
+  for_each_wall_row(s, cloud, [&](int, const Projection &p) { fit.add(p.normal, wall_weight); });
+  Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
+  functional.topRows<2>() = fit.inverse() / s.h;
+  return functional;
+}
+
+/// Functionals of d/dx, d/dy for fields known in the fluid only (velocity): no wall rows.
+Mat<2> fluid_gradient(const Stencil &s, const Points &points) {
+  LinearFit fit;
+  for_each_neighbour(s, points, [&](const Neighbour &n) { fit.add(n.q, n.w); });
+  return fit.inverse() / s.h;
+}
+
+// --- velocity -------------------------------------------------------------------------------
+
+/// Gradient of u* at the point [1/s], g(a, b) = d u_a / d x_b.
+Mat<2> velocity_gradient(const Stencil &s, const Points &points,
+                         std::span<const Vec<2>> velocity,
+                         const Eigen::Matrix<double, 5, 2> &functional) {
+  Mat<2> g = Mat<2>::Zero();
+  for_each_neighbour(s, points, [&](const Neighbour &n) {
+    const Vec<2> coefficient = n.w * (functional.transpose() * quadratic_basis(n.q));
+    g += (velocity[n.j] - velocity[s.i]) * coefficient.transpose();
+  });
+  return g;
+}
+
+// --- Laplacian rows -------------------------------------------------------------------------
+
+/// One row under construction: neighbour weights in list order, wall weights by projection.
+struct Row {
+  std::span<double> neighbour;   // of f_j - f_i
+  std::array<double, 3> wall{};  // of g [m]
+};
+
+bool has_wrong_signs(const Row &row, double guard) {
+  double negative = 0, positive = 0;
+  for (const double a : row.neighbour)
+    (a < 0 ? negative : positive) += std::abs(a);
+  return negative > guard * positive || !(positive > 0);
+}
+
+void quadratic_row(const Stencil &s, const Points &points, const Cloud &cloud, const Basis &lap,
+                   Row &row) {
+  std::size_t k = 0;
+  for_each_neighbour(s, points, [&](const Neighbour &n) {
+    row.neighbour[k++] = n.w * lap.dot(quadratic_basis(n.q));
+  });
+  for_each_wall_row(s, cloud, [&](int m, const Projection &p) {
+    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+    row.wall[m] = wall_weight * s.h * lap.dot(normal_derivative(q, p.normal));
+  });
+}
+
+/// Renormalised Laplacian with the point's own projections as neighbours of value f_i + d g:
+/// 2 dim sum w (1 - r . B o) (f_j - f_i) / sum w |r|^2 (1 - r . B o), B the inverse second moment,
+/// o the offset. Exact for linear fields and |r|^2. `skew` = B o = 0 gives positive weights.
+/// Source: Basic, Degiuli, Ban, J. Comput. Phys. 354 (2018) 268 (form reconstructed; verified by
+/// its identities in the tests).
+void renormalised_row(const Stencil &s, const Points &points, const Cloud &cloud,
+                      const Vec<2> &skew, Row &row) {
+  double denominator = 0;
+  std::size_t k = 0;
+  for_each_neighbour(s, points, [&](const Neighbour &n) {
+    const double a = n.w * (1 - n.q.dot(skew));
+    row.neighbour[k++] = a;
+    denominator += a * n.q.squaredNorm();
+  });
+  for_each_wall_row(s, cloud, [&](int m, const Projection &p) {
+    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+    const double a = weight(std::min(q.norm(), 1.0)) * (1 - q.dot(skew));
+    row.wall[m] = a * p.distance;
+    denominator += a * q.squaredNorm();
+  });
+  const double scale = denominator != 0 ? 4 / (denominator * s.h * s.h) : 0.0;
+  for (double &a : row.neighbour)
+    a *= scale;
+  for (double &a : row.wall)
+    a *= scale;
+}
+
+Vec<2> renormalising_skew(const Stencil &s, const Points &points, const Cloud &cloud) {
+  LinearFit fit;
+  Vec<2> offset = Vec<2>::Zero();
+  const auto add = [&](const Vec<2> &q, double w) {
+    fit.add(q, w);
+    offset += w * q;
+  };
+  for_each_neighbour(s, points, [&](const Neighbour &n) { add(n.q, n.w); });
+  for_each_wall_row(s, cloud, [&](int, const Projection &p) {
+    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+    add(q, weight(std::min(q.norm(), 1.0)));
+  });
+  return fit.inverse() * offset;
+}
+
+enum class RowKind { quadratic, linear, plain };
+
+/// The fallback ladder: the first row whose signs keep the matrix definite.
+RowKind laplacian_row(const Stencil &s, const Points &points, const Cloud &cloud,
+                      const QuadraticFit *fit, double guard, Row &row) {
+  if (fit) {
+    const double h2 = s.h * s.h;
+    quadratic_row(s, points, cloud, fit->solve({0, 0, 2 / h2, 0, 2 / h2}), row);
+    if (!has_wrong_signs(row, guard))
+      return RowKind::quadratic;
+  }
+  row.wall = {};
+  renormalised_row(s, points, cloud, renormalising_skew(s, points, cloud), row);
+  if (!has_wrong_signs(row, guard))
+    return RowKind::linear;
+  row.wall = {};
+  renormalised_row(s, points, cloud, Vec<2>::Zero(), row);
+  return RowKind::plain;
+}
+
+/// Row of a surface point: pressure falls linearly to zero at the plane half a spacing outside,
+/// p_i = a D/2 with the slope a fitted to the interior neighbours at depth d_j below the plane:
+/// p_i = D/2 sum w d_j p_j / sum w d_j^2. Exact for hydrostatic pressure; an M-matrix row.
+void surface_row(const Stencil &s, const Points &points, const Cloud &cloud,
+                 std::span<double> entry) {
+  const Vec<2> &n = cloud.surface_normal[s.i];
+  const double half = 0.5 * cloud.spacing / s.h;
+  double denominator = 0;
+  std::size_t k = 0;
+  for_each_neighbour(s, points, [&](const Neighbour &m) {
+    const double depth = half - n.dot(m.q);
+    const bool is_donor = cloud.kind[m.j] == PointKind::interior && depth > half;
+    entry[k++] = is_donor ? -half * m.w * depth : 0.0;
+    denominator += is_donor ? m.w * depth * depth : 0.0;
+  });
+  for (double &e : entry)
+    e = denominator > 0 ? e / denominator : 0.0;
+}
+
+// --- assembly -------------------------------------------------------------------------------
+
+void lay_out(const Cloud &cloud, PressureProblem &problem) {
+  const int n = static_cast<int>(cloud.kind.size());
+  SparseMatrix &matrix = problem.matrix;
+  matrix.row_start.resize(n + 1);
+  matrix.row_start[0] = 0;
+  for (int i = 0; i < n; ++i)
+    matrix.row_start[i + 1] = matrix.row_start[i] + 1 + cloud.neighbours.count[i];
+  matrix.column.resize(matrix.row_start[n]);
+  matrix.value.resize(matrix.row_start[n]);
+  problem.fluid_source.resize(n);
+  problem.source.resize(n);
+  problem.gradient.resize(n);
+  problem.velocity_gradient.resize(n);
+  problem.wall_rows.assign(cloud.point_walls.size(), {});
+}
+
+class Assembler {
+public:
+  Assembler(const Points &points, const Cloud &cloud, const PressureParams &params,
+            std::span<const Vec<2>> velocity, std::span<const double> target, double dt,
+            PressureProblem &problem)
+      : points_(points), cloud_(cloud), params_(params), velocity_(velocity), target_(target),
+        dt_(dt), problem_(problem) {}
+
+  RowKind row(int i) const {
+    const Stencil s = stencil_of(i, cloud_);
+    fill_columns(s);
+    if (cloud_.kind[i] != PointKind::interior) {
+      open_row(s);
+      return RowKind::quadratic;
+    }
+    return poisson_row(s);
+  }
+
+private:
+  std::span<double> off_diagonal(const Stencil &s) const {
+    return {problem_.matrix.value.data() + problem_.matrix.row_start[s.i] + 1,
+            s.neighbours.size()};
+  }
+
+  void fill_columns(const Stencil &s) const {
+    int *column = problem_.matrix.column.data() + problem_.matrix.row_start[s.i];
+    *column = s.i;
+    std::copy(s.neighbours.begin(), s.neighbours.end(), column + 1);
+  }
+
+  void open_row(const Stencil &s) const {
+    problem_.matrix.value[problem_.matrix.row_start[s.i]] = 1;
+    problem_.fluid_source[s.i] = 0;
+    surface_row(s, points_, cloud_, off_diagonal(s));
+    problem_.gradient[s.i] = linear_gradient(s, points_, cloud_);
+    update_velocity_gradient(s, linear_functional(s));
+    update_wall_rows(s, {});
+  }
+
+  RowKind poisson_row(const Stencil &s) const {
+    QuadraticFit fit = quadratic_fit(s, points_, cloud_);
+    const bool regular = fit.factorise();
+    Row row{off_diagonal(s), {}};
+    const RowKind kind =
+        laplacian_row(s, points_, cloud_, regular ? &fit : nullptr, params_.row_guard, row);
+    if (kind == RowKind::quadratic) {
+      problem_.gradient[s.i].col(0) = fit.solve({1 / s.h, 0, 0, 0, 0});
+      problem_.gradient[s.i].col(1) = fit.solve({0, 1 / s.h, 0, 0, 0});
+    } else {
+      problem_.gradient[s.i] = linear_gradient(s, points_, cloud_);
+    }
+    const bool near_wall = s.walls && s.walls->count > 0 &&
+                           s.walls->projection[0].distance < reach_of_rows(cloud_);
+    const bool symmetric = kind == RowKind::quadratic && !near_wall;
+    update_velocity_gradient(s, symmetric ? problem_.gradient[s.i] : linear_functional(s));
+    update_wall_rows(s, row.wall);
+    finish_poisson_row(s, row);
+    return kind;
+  }
+
+  Eigen::Matrix<double, 5, 2> linear_functional(const Stencil &s) const {
+    Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
+    functional.topRows<2>() = fluid_gradient(s, points_);
+    return functional;
+  }
+
+  void update_velocity_gradient(const Stencil &s,
+                                const Eigen::Matrix<double, 5, 2> &functional) const {
+    problem_.velocity_gradient[s.i] = velocity_gradient(s, points_, velocity_, functional);
+  }
+
+  void update_wall_rows(const Stencil &s, const std::array<double, 3> &laplacian) const {
+    const double scale = cloud_.spacing * cloud_.spacing;
+    for_each_wall_row(s, cloud_, [&](int m, const Projection &p) {
+      const Vec<2> r = p.point - points_.position[s.i];
+      const Vec<2> u = velocity_[s.i] + problem_.velocity_gradient[s.i] * r;
+      WallRow &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
+      wall.approach = p.normal.dot(u);
+      wall.laplacian = scale * laplacian[m];
+      wall.gradient = wall_weight * s.h *
+                      (problem_.gradient[s.i].transpose() * normal_derivative(r / s.h, p.normal));
+    });
+  }
+
+  void finish_poisson_row(const Stencil &s, const Row &row) const {
+    const double scale = cloud_.spacing * cloud_.spacing;
+    double sum = 0;
+    for (double &a : row.neighbour) {
+      a *= -scale;
+      sum -= a;
+    }
+    problem_.matrix.value[problem_.matrix.row_start[s.i]] = sum > 0 ? sum : 1.0;
+    double source = params_.density / dt_ *
+                    (problem_.velocity_gradient[s.i].trace() - target_[s.i]) * scale;
+    for_each_wall_row(s, cloud_, [&](int m, const Projection &) {
+      const WallRow &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
+      source -= wall.laplacian * params_.density / dt_ * wall.approach;
+    });
+    problem_.fluid_source[s.i] = -source;
+  }
+
+  const Points &points_;
+  const Cloud &cloud_;
+  const PressureParams &params_;
+  std::span<const Vec<2>> velocity_;
+  std::span<const double> target_;
+  double dt_;
+  PressureProblem &problem_;
+};
+
+} // namespace
+
+void assemble_pressure(const Points &points, const Cloud &cloud, const PressureParams &params,
+                       std::span<const Vec<2>> predicted_velocity,
+                       std::span<const double> target_divergence, double dt,
+                       PressureProblem &problem) {
+  lay_out(cloud, problem);
+  const Assembler assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
+                           problem);
+  const auto counts = block_sums<3>(points.size(), [&](IndexRange range) {
+    std::array<double, 3> count{};
+    for (int i = range.begin; i < range.end; ++i)
+      count[static_cast<std::size_t>(assemble.row(i))] += 1;
+    return count;
+  });
+  problem.rows = {static_cast<int>(counts[0]), static_cast<int>(counts[1]),
+                  static_cast<int>(counts[2])};
+}
+
+void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressureParams &params,
+                       double dt, PressureProblem &problem) {
+  problem.source = problem.fluid_source;
+  const double factor = params.density / dt;
+  for_each_index(static_cast<int>(cloud.wall_points.size()), [&](int k) {
+    const PointWalls &projections = cloud.point_walls[k];
+    for (int m = 0; m < projections.count; ++m) {
+      const Projection &p = projections.projection[m];
+      if (p.distance >= reach_of_rows(cloud))
+        continue;
+      WallRow &wall = problem.wall_rows[k][m];
+      const double wall_speed = p.normal.dot(wall_velocity(walls, p));
+      wall.datum = factor * (wall.approach - wall_speed);
+      problem.source[cloud.wall_points[k]] -= wall.laplacian * factor * wall_speed;
+    }
+  });
+}
+
+Vec<2> pressure_gradient(int i, const Points &points, const Cloud &cloud,
+                         const PressureProblem &problem, std::span<const double> pressure) {
+  const Stencil s = stencil_of(i, cloud);
+  const auto &functional = problem.gradient[i];
+  Vec<2> gradient = Vec<2>::Zero();
+  for_each_neighbour(s, points, [&](const Neighbour &n) {
+    const double scaled = n.w * (pressure[n.j] - pressure[i]);
+    gradient += scaled * (functional.transpose() * quadratic_basis(n.q));
+  });
+  if (s.open)
+    gradient -= weight(s.open_side.norm()) * pressure[i] *
+                (functional.topRows<2>().transpose() * s.open_side);
+  for_each_wall_row(s, cloud, [&](int m, const Projection &) {
+    const WallRow &wall = problem.wall_rows[cloud.wall_slot[i]][m];
+    gradient += wall.datum * wall.gradient;
+  });
+  return gradient;
+}
+
+} // namespace sluice::fluid

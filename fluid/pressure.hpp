@@ -1,0 +1,66 @@
+// SPDX-License-Identifier: MIT
+// The pressure that makes the velocity solenoidal, on a frozen cloud.
+//
+//   interior  L p = rho/dt (D u* - theta),   n . grad p = rho/dt n . (u* - u_wall) at walls,
+//   surface   p falls linearly to zero half a spacing outside the outermost points,
+//   after     u = u* - dt/rho grad p.
+//
+// D sees the fluid alone; the jump at a wall is counted once, in the Neumann datum. A coupling
+// iteration changes u_wall only, hence the right-hand side only.
+#pragma once
+
+#include "fluid/cloud.hpp"
+#include "fluid/least_squares.hpp"
+#include "fluid/sparse_matrix.hpp"
+
+#include <vector>
+
+namespace sluice::fluid {
+
+/// Coefficients of one projection in the rows of its point.
+struct WallRow {
+  double approach = 0;      // n . u* of the fluid at the wall, extrapolated [m/s]
+  double laplacian = 0;     // of the datum g in the point's Laplacian row, times spacing^2 [m]
+  Vec<2> gradient{0, 0};    // of the datum g in the point's gradient [-]
+  double datum = 0;         // g = n . grad p [Pa/m], with the latest wall velocity
+};
+
+/// How the rows of the Laplacian were made, for the run report.
+struct RowCounts {
+  int quadratic = 0; // the quadratic fit
+  int linear = 0;    // sign guard: renormalised (LDD) Laplacian instead
+  int plain = 0;     // sign guard: positive weights without correction
+};
+
+/// The discrete pressure problem of one step.
+struct PressureProblem {
+  SparseMatrix matrix;              // rows scaled by spacing^2: entries of order one
+  std::vector<double> fluid_source; // right-hand side without the wall velocity
+  std::vector<double> source;       // right-hand side with it
+  std::vector<Eigen::Matrix<double, 5, 2>> gradient; // functionals of d/dx and d/dy per point
+  std::vector<std::array<WallRow, 3>> wall_rows;     // per wall slot
+  std::vector<Mat<2>> velocity_gradient;             // of u* [1/s], rows: component
+  RowCounts rows;
+};
+
+struct PressureParams {
+  double density = 1000;       // [kg/m^3]
+  double row_guard = 0.1;      // largest ratio of negative to positive weights in a row
+};
+
+/// Assembles matrix, fluid source and gradient functionals. `target_divergence` [1/s] per point is
+/// the rate at which a cell shall grow (volume control); `dt` [s].
+void assemble_pressure(const Points &points, const Cloud &cloud, const PressureParams &params,
+                       std::span<const Vec<2>> predicted_velocity,
+                       std::span<const double> target_divergence, double dt,
+                       PressureProblem &problem);
+
+/// Sets the wall data and the right-hand side for the current wall velocity.
+void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressureParams &params,
+                       double dt, PressureProblem &problem);
+
+/// grad p at a point [Pa/m]: wall data and the surface's zero included.
+Vec<2> pressure_gradient(int i, const Points &points, const Cloud &cloud,
+                         const PressureProblem &problem, std::span<const double> pressure);
+
+} // namespace sluice::fluid

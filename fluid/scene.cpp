@@ -1,0 +1,192 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/scene.hpp"
+
+#include "bridge/base/check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace sluice::fluid {
+
+namespace {
+
+// --- walls ----------------------------------------------------------------------------------
+
+void add_leg(Walls &walls, const WallParams &wall, int wall_index, const Vec<2> &to) {
+  const int first = static_cast<int>(walls.position.size()) - 1;
+  const Vec<2> from = walls.position[first];
+  const double length = (to - from).norm();
+  const int pieces = wall.segment_length > 0
+                         ? std::max(1, static_cast<int>(std::lround(length / wall.segment_length)))
+                         : 1;
+  for (int k = 1; k <= pieces; ++k) {
+    const double t = static_cast<double>(k) / pieces;
+    walls.position.push_back(k == pieces ? to : Vec<2>((1 - t) * from + t * to));
+    const int b = first + k;
+    if (wall.coupled)
+      walls.coupled_segments.push_back(static_cast<int>(walls.segments.size()));
+    walls.segments.push_back({b - 1, b, -1, -1, wall_index});
+  }
+}
+
+void add_wall(Walls &walls, const WallParams &wall) {
+  const int index = static_cast<int>(walls.names.size());
+  walls.names.push_back(wall.name);
+  const int first = static_cast<int>(walls.position.size());
+  walls.position.push_back(wall.points.front());
+  for (std::size_t k = 1; k < wall.points.size(); ++k) {
+    check((wall.points[k] - wall.points[k - 1]).norm() > 1e-9,
+          "wall '{}': points {} and {} coincide at ({}, {}) m", wall.name, k - 1, k,
+          wall.points[k].x(), wall.points[k].y());
+    add_leg(walls, wall, index, wall.points[k]);
+  }
+  if (wall.coupled)
+    for (int v = first; v < static_cast<int>(walls.position.size()); ++v)
+      walls.coupled_vertices.push_back(v);
+}
+
+Walls read_walls(const Config &config) {
+  Walls walls;
+  for (const WallParams &wall : config.read_all<WallParams>("fluid.wall"))
+    add_wall(walls, wall);
+  walls.velocity.assign(walls.position.size(), Vec<2>::Zero());
+  link_outlines(walls);
+  return walls;
+}
+
+std::vector<int> all_segments(const Walls &walls) {
+  std::vector<int> all(walls.segments.size());
+  for (std::size_t k = 0; k < all.size(); ++k)
+    all[k] = static_cast<int>(k);
+  return all;
+}
+
+// --- water ----------------------------------------------------------------------------------
+
+bool is_inside(const std::vector<Vec<2>> &polygon, const Vec<2> &x) {
+  bool inside = false;
+  for (std::size_t k = 0, m = polygon.size() - 1; k < polygon.size(); m = k++) {
+    const Vec<2> &a = polygon[k], &b = polygon[m];
+    if ((a.y() > x.y()) != (b.y() > x.y()) &&
+        x.x() < (b.x() - a.x()) * (x.y() - a.y()) / (b.y() - a.y()) + a.x())
+      inside = !inside;
+  }
+  return inside;
+}
+
+double signed_area(const std::vector<Vec<2>> &polygon) {
+  double twice = 0;
+  for (std::size_t k = 0, m = polygon.size() - 1; k < polygon.size(); m = k++)
+    twice += cross(polygon[m], polygon[k]);
+  return 0.5 * twice;
+}
+
+struct Box {
+  Vec<2> low = Vec<2>::Constant(1e300), high = Vec<2>::Constant(-1e300);
+};
+
+Box bounding_box(const std::vector<Vec<2>> &points) {
+  Box box;
+  for (const Vec<2> &x : points) {
+    box.low = box.low.cwiseMin(x);
+    box.high = box.high.cwiseMax(x);
+  }
+  return box;
+}
+
+// Square lattice over the box, half a spacing inside its edges, turned about the box's corner.
+std::vector<Vec<2>> lattice_in(const std::vector<Vec<2>> &polygon, double spacing, double angle) {
+  const Box box = bounding_box(polygon);
+  const Vec<2> size = box.high - box.low;
+  const double c = std::cos(angle), s = std::sin(angle);
+  const int reach = static_cast<int>((size.x() + size.y()) / spacing) + 2;
+  const int low = angle == 0 ? 0 : -reach;
+  std::vector<Vec<2>> points;
+  for (int j = low; j < reach; ++j)
+    for (int i = low; i < reach; ++i) {
+      const Vec<2> l = spacing * Vec<2>(i + 0.5, j + 0.5);
+      const Vec<2> x = box.low + Vec<2>(c * l.x() - s * l.y(), s * l.x() + c * l.y());
+      if (is_inside(polygon, x))
+        points.push_back(x);
+    }
+  return points;
+}
+
+void check_clear_of_walls(const Scene &scene) {
+  const auto segments = all_segments(scene.walls);
+  const double spacing = scene.params.spacing;
+  for (const Vec<2> &x : scene.initial.points.position)
+    for (const Projection &p : project_on_walls(scene.walls, segments, x, spacing))
+      check(p.distance > 0,
+            "the water overlaps wall '{}': a point at ({:.6g}, {:.6g}) m lies {:.3g} m behind it; "
+            "correct water_m or the wall (the fluid lies on the left of its points_m)",
+            scene.walls.names[scene.walls.segments[p.segment].wall], x.x(), x.y(), -p.distance);
+}
+
+void check_hole(const Scene &scene, std::span<const int> segments, const Vec<2> &x) {
+  double nearest = 1e300;
+  for (const int s : segments) {
+    const WallSegment &segment = scene.walls.segments[s];
+    const Vec<2> a = scene.walls.position[segment.a], e = scene.walls.position[segment.b] - a;
+    const double t = std::clamp((x - a).dot(e) / e.squaredNorm(), 0.0, 1.0);
+    nearest = std::min(nearest, (a + t * e - x).norm());
+  }
+  check(nearest < 0.5 * scene.params.spacing,
+        "hole in the walls below the water line at ({:.6g}, {:.6g}) m: the nearest wall is {:.3g} m "
+        "away; close the wall there, or set open_sides = true if the water is meant to run out",
+        x.x(), x.y(), nearest);
+}
+
+// Every edge of the water that does not face upwards must lie on a wall.
+void check_holes(const Scene &scene) {
+  const auto segments = all_segments(scene.walls);
+  const std::vector<Vec<2>> &water = scene.params.water;
+  const double orientation = signed_area(water) > 0 ? 1 : -1;
+  const Vec<2> up = -scene.params.gravity.normalized();
+  for (std::size_t k = 0; k < water.size(); ++k) {
+    const Vec<2> a = water[k], e = water[(k + 1) % water.size()] - a;
+    const Vec<2> outward = -orientation * rotated_left(e).normalized();
+    if (outward.dot(up) > 0.1)
+      continue;
+    const int samples = std::max(2, static_cast<int>(e.norm() / scene.params.spacing));
+    for (int m = 0; m < samples; ++m)
+      check_hole(scene, segments, a + (m + 0.5) / samples * e);
+  }
+}
+
+Points fill(const FluidParams &params) {
+  Points points;
+  points.position =
+      lattice_in(params.water, params.spacing, params.lattice_angle * std::numbers::pi / 180);
+  const std::size_t n = points.position.size();
+  check(n >= 4, "water_m holds {} points at a spacing of {} m; use a smaller spacing_m", n,
+        params.spacing);
+  points.velocity.assign(n, Vec<2>::Zero());
+  points.previous_velocity.assign(n, Vec<2>::Zero());
+  points.shift.assign(n, Vec<2>::Zero());
+  points.shift_velocity.assign(n, Vec<2>::Zero());
+  points.pressure.assign(n, 0);
+  points.at_surface.assign(n, 0);
+  points.id.resize(n);
+  for (std::size_t i = 0; i < n; ++i)
+    points.id[i] = static_cast<std::int32_t>(i);
+  return points;
+}
+
+} // namespace
+
+Scene read_scene(const Config &config) {
+  Scene scene;
+  scene.params = config.read<FluidParams>("fluid");
+  scene.walls = read_walls(config);
+  scene.gauges = config.read_all<GaugeParams>("fluid.gauge");
+  check(!scene.walls.segments.empty(), "{}: the scene has no [[fluid.wall]]", config.file_name());
+  scene.initial.points = fill(scene.params);
+  check_clear_of_walls(scene);
+  if (!scene.params.open_sides && scene.params.gravity.norm() > 0)
+    check_holes(scene);
+  return scene;
+}
+
+} // namespace sluice::fluid

@@ -1,0 +1,98 @@
+// SPDX-License-Identifier: MIT
+// From a case file to a scene: parameters, walls, and the water filled with points.
+#pragma once
+
+#include "bridge/base/config.hpp"
+#include "fluid/motion.hpp"
+#include "fluid/points.hpp"
+#include "fluid/walls.hpp"
+
+#include <string>
+#include <vector>
+
+namespace sluice::fluid {
+
+/// Table [fluid].
+struct FluidParams {
+  double spacing = 0;
+  double density = 1000;
+  double viscosity = 1e-3;
+  Vec<2> gravity{0, -9.81};
+  std::vector<Vec<2>> water;
+  double lattice_angle = 0;
+  double outlet_x = 1e300;
+  bool open_sides = false;
+  std::string coupled_walls = "move";
+  double pressure_tolerance = 1e-8;
+  double row_guard = 0.1;
+  MotionParams motion;
+
+  template <class Reader> void describe(Reader &read) {
+    read.required("spacing_m", spacing, "distance between points").positive();
+    read("density_kg_m3", density, "mass per volume").positive();
+    read("dynamic_viscosity_pa_s", viscosity, "dynamic viscosity; 0 is inviscid").at_least(0);
+    read("gravity_m_s2", gravity, "acceleration of gravity");
+    read.required("water_m", water, "polygon that is filled with points at t = 0")
+        .check(water.size() >= 3, "needs at least three corners");
+    read("lattice_angle_deg", lattice_angle, "angle by which the first lattice is turned")
+        .at_least(-45)
+        .at_most(45);
+    read("outlet_x_m", outlet_x, "points beyond leave the scene and count as outflow");
+    read("open_sides", open_sides, "water may touch air at its sides and below at t = 0");
+    read("coupled_walls", coupled_walls, "what coupled walls do")
+        .one_of({"move", "stay"});
+    read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative").positive();
+    read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
+    read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
+        .at_least(0);
+    read("volume_rate", motion.volume_rate, "decay of volume errors, in sqrt(g / spacing)")
+        .at_least(0);
+    read("closest_pair", motion.closest_pair, "closest distance of two points, in spacings")
+        .at_least(0)
+        .at_most(0.9);
+    read("wall_clearance", motion.wall_clearance, "closest distance to a wall, in spacings")
+        .positive()
+        .at_most(0.5);
+  }
+};
+
+/// Table [[fluid.wall]]: a polyline with the fluid on its left.
+struct WallParams {
+  std::string name;
+  std::vector<Vec<2>> points;
+  bool coupled = false;
+  double segment_length = 0;
+
+  template <class Reader> void describe(Reader &read) {
+    read.required("name", name, "name of the wall");
+    read.required("points_m", points, "polyline with the fluid on its left")
+        .check(points.size() >= 2, "needs at least two points");
+    read("coupled", coupled, "moves with the partner of the bridge");
+    read("segment_length_m", segment_length, "longest segment; 0 keeps the given ones")
+        .at_least(0);
+  }
+};
+
+/// Table [[fluid.gauge]]: water level at a place.
+struct GaugeParams {
+  std::string name;
+  double x = 0;
+
+  template <class Reader> void describe(Reader &read) {
+    read.required("name", name, "name of the gauge");
+    read.required("x_m", x, "place of the gauge");
+  }
+};
+
+struct Scene {
+  FluidParams params;
+  Walls walls;
+  std::vector<GaugeParams> gauges;
+  FluidState initial;
+};
+
+/// Reads the tables of the fluid and fills the water. Throws UserError, with place and numbers, on
+/// water that overlaps a wall, a hole in the walls below the water line, or too few points.
+Scene read_scene(const Config &config);
+
+} // namespace sluice::fluid

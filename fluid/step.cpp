@@ -1,0 +1,157 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/step.hpp"
+
+#include "bridge/base/check.hpp"
+#include "fluid/parallel.hpp"
+
+#include <algorithm>
+
+namespace sluice::fluid {
+
+FluidSolver::FluidSolver(const Scene &scene)
+    : state(scene.initial), walls(scene.walls), params_(scene.params) {
+  pressure_params_.density = params_.density;
+  pressure_params_.row_guard = params_.row_guard;
+  domain_low_ = Vec<2>::Constant(1e300);
+  domain_high_ = Vec<2>::Constant(-1e300);
+  for (const Vec<2> &x : walls.position) {
+    domain_low_ = domain_low_.cwiseMin(x);
+    domain_high_ = domain_high_.cwiseMax(x);
+  }
+  nodal_forces_.assign(walls.position.size(), Vec<2>::Zero());
+}
+
+void FluidSolver::begin_step(double dt) {
+  dt_ = dt;
+  report_ = {};
+  timer("move", [&] { move_points(state.points, dt); });
+  freeze_cloud();
+  timer("viscosity", [&] { predict_velocity(); });
+  assemble();
+}
+
+void FluidSolver::iterate() {
+  Points &points = state.points;
+  set_wall_velocity(walls, cloud_, pressure_params_, dt_, problem_);
+  const SolveResult result = timer("pressure solve", [&] {
+    SolveOptions options;
+    options.relative_tolerance = params_.pressure_tolerance;
+    return bicgstab(scaled_, problem_.source, points.pressure, multigrid_, options, memory_);
+  });
+  check(result.converged,
+        "step {}: the pressure solve stopped after {} iterations at a residual of {:.2e} Pa; "
+        "reduce the time step",
+        state.step + 1, result.iterations, result.residual);
+  report_.pressure_iterations += result.iterations;
+  ++report_.pressure_solves;
+  timer("loads", [&] {
+    evaluate_tractions(points, walls, cloud_, problem_, points.pressure, params_.viscosity,
+                       quadrature_, tractions_);
+    integrate_nodal_forces(walls, quadrature_, tractions_, nodal_forces_);
+  });
+}
+
+void FluidSolver::end_step() {
+  Points &points = state.points;
+  timer("project", [&] {
+    const double factor = dt_ / params_.density;
+    for_each_point(points.size(), [&](int i) {
+      points.previous_velocity[i] = points.velocity[i];
+      points.velocity[i] = predicted_[i] - factor * pressure_gradient(i, points, cloud_, problem_,
+                                                                      points.pressure);
+    });
+    plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
+  });
+  ++state.step;
+}
+
+namespace {
+
+void remove_points(Points &points, const std::vector<char> &leaves) {
+  const auto compact = [&](auto &values) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < values.size(); ++i)
+      if (!leaves[i])
+        values[n++] = values[i];
+    values.resize(n);
+  };
+  compact(points.position);
+  compact(points.velocity);
+  compact(points.previous_velocity);
+  compact(points.shift);
+  compact(points.shift_velocity);
+  compact(points.pressure);
+  compact(points.id);
+  compact(points.at_surface);
+}
+
+} // namespace
+
+void FluidSolver::leave_through_outlet() {
+  Points &points = state.points;
+  std::vector<char> leaves(points.size(), 0);
+  bool any = false;
+  for (int i = 0; i < points.size(); ++i) {
+    const Vec<2> &x = points.position[i];
+    const bool is_out = x.x() > params_.outlet_x;
+    const bool is_lost = !is_out && (x.x() < domain_low_.x() - cloud_.spacing ||
+                                     x.x() > domain_high_.x() + cloud_.spacing ||
+                                     x.y() < domain_low_.y() - cloud_.spacing);
+    state.outflow_points += is_out;
+    state.lost_points += is_lost;
+    leaves[i] = is_out || is_lost;
+    any = any || leaves[i];
+  }
+  if (any)
+    remove_points(points, leaves);
+}
+
+void FluidSolver::freeze_cloud() {
+  Points &points = state.points;
+  timer("search", [&] {
+    cloud_.spacing = params_.spacing;
+    leave_through_outlet();
+    update_neighbours(points, walls, params_.spacing, cloud_);
+  });
+  timer("walls", [&] {
+    state.wall_returns += keep_clear_of_walls(points, walls, params_.motion, cloud_);
+  });
+  timer("search", [&] { update_neighbours(points, walls, params_.spacing, cloud_); });
+  timer("cells", [&] { update_cells(points, cloud_); });
+}
+
+void FluidSolver::predict_velocity() {
+  Points &points = state.points;
+  const double nu = params_.viscosity / params_.density;
+  predicted_.assign(points.velocity.begin(), points.velocity.end());
+  if (nu > 0)
+    report_.viscous_iterations = diffuse_velocity(points, walls, cloud_, nu, dt_, predicted_,
+                                                  viscous_, memory_);
+  for_each_point(points.size(), [&](int i) { predicted_[i] += dt_ * params_.gravity; });
+}
+
+void FluidSolver::assemble() {
+  Points &points = state.points;
+  timer("operators", [&] {
+    target_divergence_.resize(points.size());
+    volume_restoring_divergence(points, cloud_, params_.motion, params_.gravity.norm(),
+                                target_divergence_);
+    assemble_pressure(points, cloud_, pressure_params_, predicted_, target_divergence_, dt_,
+                      problem_);
+    report_.rows = problem_.rows;
+  });
+  timer("pressure set-up", [&] {
+    std::vector<Cell> cells(points.size());
+    for_each_point(points.size(), [&](int i) {
+      const Vec<2> c = (points.position[i] - cloud_.grid.origin) / (2 * cloud_.spacing);
+      cells[i] = {static_cast<int>(c.x()), static_cast<int>(c.y())};
+    });
+    scaled_.build(problem_.matrix);
+    multigrid_.build(scaled_, cells);
+  });
+  timer("loads", [&] {
+    build_wall_quadrature(points, walls, cloud_, WallPart::coupled, quadrature_);
+  });
+}
+
+} // namespace sluice::fluid

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: MIT
+// One time step of the fluid, in the three parts that coupling needs: what happens once before the
+// iterations (move, freeze the cloud, assemble), what a coupling iteration repeats (pressure and
+// loads for a wall velocity), and what happens once after (project the velocity).
+#pragma once
+
+#include "bridge/base/timer.hpp"
+#include "fluid/bicgstab.hpp"
+#include "fluid/multigrid.hpp"
+#include "fluid/pressure.hpp"
+#include "fluid/scene.hpp"
+#include "fluid/viscosity.hpp"
+#include "fluid/wall_loads.hpp"
+
+#include <memory>
+#include <vector>
+
+namespace sluice::fluid {
+
+/// Work of one step, for the run report.
+struct StepReport {
+  RowCounts rows;
+  int pressure_iterations = 0;  // over all coupling iterations of the step
+  int viscous_iterations = 0;
+  int pressure_solves = 0;
+};
+
+class FluidSolver {
+public:
+  explicit FluidSolver(const Scene &scene);
+
+  FluidState state; // a value: copy it to keep a checkpoint
+  Walls walls;      // move coupled vertices through here
+
+  /// Moves the points, freezes the cloud at walls.position, assembles viscosity and pressure.
+  void begin_step(double dt);
+  /// Pressure and wall loads for walls.velocity. Throws UserError when the pressure solver fails.
+  void iterate();
+  /// Velocity after the pressure; plans the regularisation of the next move.
+  void end_step();
+
+  const std::vector<Vec<2>> &nodal_forces() const { return nodal_forces_; } // per wall vertex [N/m]
+  const std::vector<Vec<2>> &tractions() const { return tractions_; }       // per coupled sample
+  const WallQuadrature &quadrature() const { return quadrature_; }
+  const Cloud &cloud() const { return cloud_; }
+  const PressureProblem &problem() const { return problem_; }
+  const StepReport &report() const { return report_; }
+  const FluidParams &params() const { return params_; }
+  double dt() const { return dt_; }
+  PhaseTimer timer;
+
+private:
+  void leave_through_outlet();
+  void freeze_cloud();
+  void predict_velocity();
+  void assemble();
+
+  FluidParams params_;
+  PressureParams pressure_params_;
+  Vec<2> domain_low_, domain_high_;
+  double dt_ = 0;
+  Cloud cloud_;
+  PressureProblem problem_;
+  ViscousProblem viscous_;
+  std::vector<Vec<2>> predicted_; // u* [m/s]
+  std::vector<double> target_divergence_;
+  ScaledMatrix scaled_;
+  Multigrid multigrid_;
+  KrylovMemory memory_;
+  WallQuadrature quadrature_;
+  std::vector<Vec<2>> tractions_, nodal_forces_;
+  StepReport report_;
+};
+
+} // namespace sluice::fluid

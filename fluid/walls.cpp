@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/walls.hpp"
+
+#include "bridge/base/check.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace sluice::fluid {
+
+namespace {
+
+struct Foot {
+  Vec<2> point;
+  double t;
+};
+
+Foot nearest_on_segment(const Vec<2> &a, const Vec<2> &b, const Vec<2> &x) {
+  const Vec<2> e = b - a;
+  const double t = std::clamp((x - a).dot(e) / e.squaredNorm(), 0.0, 1.0);
+  return {a + t * e, t};
+}
+
+Foot foot_on(const Walls &walls, int segment, const Vec<2> &x) {
+  const WallSegment &s = walls.segments[segment];
+  return nearest_on_segment(walls.position[s.a], walls.position[s.b], x);
+}
+
+// A foot is a local minimum of the distance along the outline unless it is a vertex from which
+// the neighbouring segment comes nearer. A shared vertex is reported by the segment that ends in it.
+bool is_local_minimum(const Walls &walls, int segment, const Foot &foot, const Vec<2> &x) {
+  const WallSegment &s = walls.segments[segment];
+  if (foot.t > 0 && foot.t < 1)
+    return true;
+  if (foot.t >= 1)
+    return s.next < 0 || foot_on(walls, s.next, x).t <= 0;
+  return s.previous < 0;
+}
+
+// Side of the wall at a foot: the segment's normal inside it, the mean normal at a shared vertex.
+Vec<2> fluid_side(const Walls &walls, int segment, const Foot &foot) {
+  const WallSegment &s = walls.segments[segment];
+  if (foot.t >= 1 && s.next >= 0)
+    return walls.normal(s) + walls.normal(walls.segments[s.next]);
+  return walls.normal(s);
+}
+
+Projection make_projection(const Walls &walls, int segment, const Foot &foot, const Vec<2> &x) {
+  const Vec<2> side = fluid_side(walls, segment, foot);
+  const Vec<2> offset = x - foot.point;
+  const double length = offset.norm();
+  const bool at_vertex = foot.t <= 0 || foot.t >= 1;
+  const double sign = offset.dot(side) >= 0 ? 1.0 : -1.0;
+  const Vec<2> normal = at_vertex && length > 1e-12
+                            ? Vec<2>(-sign * offset / length)
+                            : Vec<2>(-side.normalized());
+  return {foot.point, normal, sign * length, foot.t, segment};
+}
+
+void insert_by_distance(PointWalls &found, const Projection &p) {
+  constexpr double cos_30_degrees = 0.866;
+  for (int k = 0; k < found.count; ++k)
+    if (found.projection[k].normal.dot(p.normal) > cos_30_degrees) {
+      if (std::abs(p.distance) < std::abs(found.projection[k].distance))
+        found.projection[k] = p;
+      return;
+    }
+  if (found.count < static_cast<int>(found.projection.size()))
+    found.projection[found.count++] = p;
+  else if (std::abs(p.distance) < std::abs(found.projection.back().distance))
+    found.projection.back() = p;
+}
+
+} // namespace
+
+PointWalls project_on_walls(const Walls &walls, std::span<const int> candidates, const Vec<2> &x,
+                            double reach) {
+  PointWalls found;
+  for (const int s : candidates) {
+    const Foot foot = foot_on(walls, s, x);
+    if ((x - foot.point).squaredNorm() > reach * reach || !is_local_minimum(walls, s, foot, x))
+      continue;
+    insert_by_distance(found, make_projection(walls, s, foot, x));
+  }
+  std::sort(found.projection.begin(), found.projection.begin() + found.count,
+            [](const Projection &p, const Projection &q) {
+              return std::abs(p.distance) < std::abs(q.distance);
+            });
+  return found;
+}
+
+bool is_hidden(const Walls &walls, std::span<const int> candidates, const Vec<2> &from,
+               const Vec<2> &to) {
+  const Vec<2> path = to - from;
+  for (const int k : candidates) {
+    const WallSegment &s = walls.segments[k];
+    const Vec<2> a = walls.position[s.a] - from, b = walls.position[s.b] - from;
+    const double side_a = cross(path, a), side_b = cross(path, b);
+    if ((side_a > 0) == (side_b > 0))
+      continue;
+    const Vec<2> e = b - a;
+    const double start = cross(e, -a), end = cross(e, path - a);
+    if ((start > 0) != (end > 0))
+      return true;
+  }
+  return false;
+}
+
+namespace {
+
+// Calls visit(cell) for every cell that the segment may come within `reach` of.
+template <class Visit>
+void for_each_cell_near(const Walls &walls, const WallSegment &s, const Grid &grid, double reach,
+                        Visit &&visit) {
+  const Vec<2> &a = walls.position[s.a], &b = walls.position[s.b];
+  const Vec<2> low = a.cwiseMin(b).array() - reach, high = a.cwiseMax(b).array() + reach;
+  const Vec<2> top = grid.origin + grid.cell_size * Vec<2>(grid.nx, grid.ny);
+  if (high.x() < grid.origin.x() || high.y() < grid.origin.y() || low.x() > top.x() ||
+      low.y() > top.y())
+    return;
+  const double limit = reach + 0.7072 * grid.cell_size;
+  for (int y = grid.row(low.y()); y <= grid.row(high.y()); ++y)
+    for (int x = grid.column(low.x()); x <= grid.column(high.x()); ++x) {
+      const Vec<2> centre = grid.origin + grid.cell_size * Vec<2>(x + 0.5, y + 0.5);
+      if ((nearest_on_segment(a, b, centre).point - centre).squaredNorm() <= limit * limit)
+        visit(y * grid.nx + x);
+    }
+}
+
+} // namespace
+
+void find_near_segments(const Walls &walls, const Grid &grid, double reach, SegmentGrid &near) {
+  near.start.assign(grid.n_cells() + 1, 0);
+  for (const WallSegment &s : walls.segments)
+    for_each_cell_near(walls, s, grid, reach, [&](int c) { ++near.start[c + 1]; });
+  for (int c = 0; c < grid.n_cells(); ++c)
+    near.start[c + 1] += near.start[c];
+  near.segment.resize(near.start.back());
+  std::vector<int> next(near.start.begin(), near.start.end() - 1);
+  for (int k = 0; k < static_cast<int>(walls.segments.size()); ++k)
+    for_each_cell_near(walls, walls.segments[k], grid, reach,
+                       [&](int c) { near.segment[next[c]++] = k; });
+}
+
+void link_outlines(Walls &walls) {
+  const int n = static_cast<int>(walls.segments.size());
+  const auto coincide = [&](int v, int w) {
+    return v == w || (walls.position[v] - walls.position[w]).norm() < 1e-9;
+  };
+  for (int k = 0; k < n; ++k)
+    for (int m = 0; m < n; ++m) {
+      WallSegment &from = walls.segments[k], &to = walls.segments[m];
+      if (k == m || !coincide(from.b, to.a))
+        continue;
+      const Vec<2> &x = walls.position[from.b];
+      check(from.next < 0 && to.previous < 0,
+            "walls '{}' and '{}': more than two segments meet at ({}, {}) m; "
+            "walls must be simple outlines with the fluid on their left",
+            walls.names[from.wall], walls.names[to.wall], x.x(), x.y());
+      from.next = m;
+      to.previous = k;
+    }
+}
+
+} // namespace sluice::fluid
