@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "bridge/launcher/participants.hpp"
 
+#include "bridge/settings.hpp"
+
 #include <fmt/ranges.h>
 
 #include <array>
@@ -51,25 +53,16 @@ fs::path find_program(const Kind &kind, const fs::path &given) {
        kind.table, kind.program, fmt::join(tried, " and "));
 }
 
-struct CaseName {
-  std::string name;
-  double end_time_s = 0, time_step_s = 0, output_interval_s = 0; // the solvers read these
-  template <class Reader> void describe(Reader &read) {
-    read.required("name", name, "names the run folder and the ParaView file")
-        .check(!name.empty() && name.find('/') == std::string::npos,
-               "must be a name without a slash");
-    read("end_time_s", end_time_s, "the run ends here");
-    read("time_step_s", time_step_s, "length of a coupling window");
-    read("output_interval_s", output_interval_s, "between two pictures");
-  }
-};
-
 } // namespace
 
 Case read_case(const Config &config) {
   // Each participant knows its own sub-tables.
   config.allow_tables({"case", "bridge", "fluid", "fluid.*", "solid", "solid.*"});
-  return {config.read<CaseName>("case").name};
+  const std::string name = config.read<bridge::CaseSettings>("case").name;
+  check(!name.empty() && name.find('/') == std::string::npos,
+        "{}: [case] needs a name without a slash, for the run folder and the ParaView file",
+        config.file_name());
+  return {name};
 }
 
 std::vector<Participant> participants_of(const Config &config, const fs::path &folder) {

@@ -45,7 +45,7 @@ struct RunOutcome {
 };
 
 struct Deadlines {
-  double grace_s = 20; ///< between the first failure and SIGTERM to the others
+  double grace_s = 10; ///< between the first failure and SIGTERM to the others
   double kill_s = 5;   ///< between SIGTERM and SIGKILL
 };
 

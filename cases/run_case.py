@@ -1,0 +1,180 @@
+# SPDX-License-Identifier: MIT
+"""Builds Sluice, runs a case, checks its results against the reference and draws them.
+
+Exit status: 0 the run is complete and inside the case's bands, 3 complete but outside,
+1 failed, 2 wrong usage, 128 + signal when it was stopped.
+"""
+
+import argparse
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+CASES = ROOT / "cases"
+BUILD = ROOT / "build"
+EXIT_FAILED, EXIT_USAGE = 1, 2
+LINES_OF_A_FAILED_BUILD = 40
+
+
+def case_names():
+    return sorted(file.parent.name for file in CASES.glob("*/case.toml"))
+
+
+def known_case(name):
+    if name not in case_names():
+        raise argparse.ArgumentTypeError(
+            f"there is no case '{name}'; valid cases are {', '.join(case_names())}")
+    return name
+
+
+def positive(text):
+    try:
+        value = float(text)
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"'{text}' is not a number above zero, in SI units")
+    return value
+
+
+def assignment(text):
+    if not re.fullmatch(r"\s*[\w-]+(\.[\w-]+)+\s*=.+", text):
+        raise argparse.ArgumentTypeError(
+            f"'{text}' is not TABLE.KEY=VALUE, for example bridge.scheme=serial-explicit")
+    return text
+
+
+def read_arguments(arguments):
+    parser = argparse.ArgumentParser(
+        prog="cases/run", description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="cases: " + ", ".join(case_names()))
+    parser.add_argument("case", metavar="CASE", type=known_case)
+    parser.add_argument("--spacing", metavar="METRES", type=positive,
+                        help="distance between fluid points (fluid.spacing_m)")
+    parser.add_argument("--end", metavar="SECONDS", type=positive,
+                        help="end of the run (case.end_time_s)")
+    parser.add_argument("--out", metavar="DIR", type=Path,
+                        help="output folder (default: out/CASE, or out/CASE-SPACING)")
+    parser.add_argument("--set", metavar="TABLE.KEY=VALUE", type=assignment, action="append",
+                        default=[], dest="overrides", help="any key of the case file; repeatable")
+    parser.add_argument("--threads", metavar="N", type=int,
+                        help="threads of each solver (default: every core)")
+    return parser.parse_args(arguments)
+
+
+def overrides_of(options):
+    overrides = list(options.overrides)
+    if options.spacing is not None:
+        overrides.append(f"fluid.spacing_m={options.spacing!r}")
+    if options.end is not None:
+        overrides.append(f"case.end_time_s={options.end!r}")
+    return overrides
+
+
+def output_folder(options):
+    if options.out is not None:
+        return options.out.absolute()
+    suffix = "" if options.spacing is None else f"-{options.spacing:g}"
+    return ROOT / "out" / (options.case + suffix)
+
+
+def show_state(text):
+    """One line that is drawn over on a terminal; nothing elsewhere."""
+    if sys.stderr.isatty():
+        print(f"\r{text}\033[K", end="", file=sys.stderr, flush=True)
+
+
+def quietly(command, title, log):
+    """Runs a build command; its output goes to `log` and is shown only when it fails."""
+    environment = dict(os.environ, NINJA_STATUS="[%f/%t] ")
+    started = time.monotonic()
+    process = subprocess.Popen(command, cwd=ROOT, text=True, env=environment, errors="replace",
+                               stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
+    lines = []
+    with log.open("a") as file:
+        for line in process.stdout:
+            file.write(line)
+            lines.append(line)
+            step = re.match(r"\[\d+/\d+\]", line)
+            if step:
+                show_state(f"{title} {step.group()} {time.monotonic() - started:.0f} s")
+    show_state("")
+    if process.wait() != 0:
+        print("".join(lines[-LINES_OF_A_FAILED_BUILD:]), end="", file=sys.stderr)
+        print(f"cases/run: {title} failed; the whole output is in {log}", file=sys.stderr)
+        sys.exit(EXIT_FAILED)
+
+
+def build():
+    BUILD.mkdir(exist_ok=True)
+    log = BUILD / "cases-run.log"
+    log.write_text("")
+    print("building ...", flush=True)
+    started = time.monotonic()
+    quietly(["cmake", "--preset", "release"], "configuring", log)
+    quietly(["cmake", "--build", "--preset", "release", "--target", "programs",
+             "-j", str(os.cpu_count() or 1)], "building", log)
+    print(f"built in {time.monotonic() - started:.0f} s")
+
+
+def run_solvers(options, folder):
+    command = [str(BUILD / "bridge/launcher/sluice"), "run",
+               str(CASES / options.case / "case.toml"), "--out", str(folder)]
+    for text in overrides_of(options):
+        command += ["--set", text]
+    if options.threads is not None:
+        command += ["--threads", str(options.threads)]
+    return call_through_signals(command)
+
+
+def call_through_signals(command):
+    """Runs `command` to its end: on a signal it is the launcher that stops the solvers and reports.
+
+    Ctrl-C reaches the launcher from the terminal; the other signals are passed on.
+    """
+    process = subprocess.Popen(command)
+    signal.signal(signal.SIGINT, lambda number, frame: None)
+    for number in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, lambda received, frame: process.send_signal(received))
+    return process.wait()
+
+
+def run_script(options, script, folder, output=None):
+    command = [str(CASES / options.case / script), str(folder)]
+    return subprocess.run(command, stdout=output).returncode
+
+
+def print_paths(options, folder):
+    """Where everything is: figures, the tip's series, the ParaView file, the summaries."""
+    names = sorted(path.name for path in folder.glob("*.png"))
+    names += ["tip.csv", f"{options.case}.pvd", "summary.md", "summary.json"]
+    print()
+    for name in names:
+        if (folder / name).is_file():
+            print(folder / name)
+
+
+def main(arguments):
+    options = read_arguments(arguments)
+    folder = output_folder(options)
+    build()
+    status = run_solvers(options, folder)
+    if status != 0:
+        return status
+    verdict = run_script(options, "validate", folder)
+    drawn = run_script(options, "plot", folder, subprocess.DEVNULL)
+    print_paths(options, folder)
+    return verdict if drawn == 0 else EXIT_FAILED
+
+
+if __name__ == "__main__":
+    try:
+        sys.exit(main(sys.argv[1:]))
+    except KeyboardInterrupt:
+        sys.exit(130)
