@@ -30,9 +30,11 @@
 
 #include "bridge/base/config.hpp"
 #include "bridge/interface_mesh.hpp"
+#include "bridge/map_report.hpp"
 #include "bridge/settings.hpp"
 #include "bridge/statistics.hpp"
 
+#include <exception>
 #include <filesystem>
 #include <memory>
 #include <span>
@@ -96,6 +98,7 @@ public:
 
   const InterfaceMesh &mesh() const;
   const InterfaceMesh &partner_mesh() const; ///< valid after initialize
+  const MapReport &map_report() const;       ///< valid after initialize
   const BridgeSettings &settings() const;
   const CaseSettings &case_settings() const;
   const Statistics &statistics() const;
@@ -107,6 +110,16 @@ private:
   class Impl;
   std::unique_ptr<Impl> impl_;
 };
+
+/// Runs `loop`, the coupled loop of a program; whatever it throws is told to the partner first.
+template <class Loop> void run_coupled(Participant &bridge, Loop &&loop) {
+  try {
+    loop();
+  } catch (const std::exception &error) {
+    bridge.abort(error.what());
+    throw;
+  }
+}
 
 /// Sums over the interface for report_totals. `positions` are the current node positions [m],
 /// `forces` the nodal forces [N], `increments` the window's displacement increments [m].

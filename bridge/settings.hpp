@@ -4,6 +4,7 @@
 
 #include "bridge/base/config.hpp"
 
+#include <cmath>
 #include <string>
 
 namespace sluice::bridge {
@@ -22,7 +23,7 @@ struct CaseSettings {
     read("output_interval_s", output_interval, "time between written fields").at_least(0);
   }
   /// Number of windows; the last one is shorter when end_time is no multiple of time_step.
-  long n_windows() const;
+  long n_windows() const { return std::lround(std::ceil(end_time / time_step - 1e-6)); }
 };
 
 /// Table [bridge]: how the participants talk, and how a window is iterated.

@@ -1,0 +1,24 @@
+// SPDX-License-Identifier: MIT
+#include "bridge/acceleration.hpp"
+
+namespace sluice::bridge {
+
+Acceleration make_acceleration(const BridgeSettings &settings) {
+  if (settings.acceleration == "constant")
+    return ConstantRelaxation(settings.initial_relaxation);
+  if (settings.acceleration == "aitken")
+    return Aitken(settings.initial_relaxation);
+  return QuasiNewton(settings.initial_relaxation, settings.windows_reused);
+}
+
+AcceleratedIterate accelerate(Acceleration &acceleration, const Eigen::VectorXd &iterate,
+                              const Eigen::VectorXd &solved) {
+  return std::visit([&](auto &chosen) { return chosen.next(iterate, solved); }, acceleration);
+}
+
+void finish_window(Acceleration &acceleration, const Eigen::VectorXd &iterate,
+                   const Eigen::VectorXd &solved) {
+  std::visit([&](auto &chosen) { chosen.finish_window(iterate, solved); }, acceleration);
+}
+
+} // namespace sluice::bridge

@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: MIT
+// The next iterate of a window from the last iterate x and what the solvers made of it, x~ =
+// S(F(x)). The residual is r = x~ - x. Every accelerator is a value: a copy is its checkpoint.
+#pragma once
+
+#include "bridge/acceleration_aitken.hpp"
+#include "bridge/acceleration_iqn.hpp"
+#include "bridge/settings.hpp"
+
+#include <variant>
+
+namespace sluice::bridge {
+
+/// x + omega r. Converges only where omega (1 + ratio of added mass to mass) < 2.
+class ConstantRelaxation {
+public:
+  explicit ConstantRelaxation(double relaxation) : relaxation_(relaxation) {}
+  AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved) {
+    return {iterate + relaxation_ * (solved - iterate), relaxation_, 0};
+  }
+  void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &) {}
+
+private:
+  double relaxation_;
+};
+
+using Acceleration = std::variant<ConstantRelaxation, Aitken, QuasiNewton>;
+
+/// The accelerator that `settings` names.
+Acceleration make_acceleration(const BridgeSettings &settings);
+
+/// The next iterate of the current window.
+AcceleratedIterate accelerate(Acceleration &acceleration, const Eigen::VectorXd &iterate,
+                              const Eigen::VectorXd &solved);
+/// The window is accepted with its last iterate and solution: history moves on.
+void finish_window(Acceleration &acceleration, const Eigen::VectorXd &iterate,
+                   const Eigen::VectorXd &solved);
+
+} // namespace sluice::bridge

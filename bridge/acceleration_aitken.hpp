@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: MIT
+// Aitken's dynamic relaxation: x + omega_k r_k with
+//   omega_k = -omega_{k-1} r_{k-1} . (r_k - r_{k-1}) / |r_k - r_{k-1}|^2.
+// The first iteration of a window takes the last factor of the window before.
+// Source: Kuettler and Wall, Comput. Mech. 43 (2008) 61-72, equations 44 and 45.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace sluice::bridge {
+
+/// What an accelerator answers, and what the log says about it.
+struct AcceleratedIterate {
+  Eigen::VectorXd next;
+  double relaxation = 1; ///< factor of the residual; 1 where a quasi-Newton step was taken
+  int columns = 0;       ///< of the quasi-Newton approximation
+};
+
+class Aitken {
+public:
+  explicit Aitken(double initial_relaxation) : relaxation_(initial_relaxation) {}
+  AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
+  void finish_window(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
+
+private:
+  double relaxation_;
+  Eigen::VectorXd last_residual_; // empty at the start of a window
+};
+
+} // namespace sluice::bridge

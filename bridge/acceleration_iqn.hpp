@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: MIT
+// Interface quasi-Newton with the inverse Jacobian from a least-squares model (IQN-ILS).
+//
+// From the iterations of this window and the last `windows_reused` ones: columns V = [delta r],
+// W = [delta x~], differences of successive iterations. With alpha = argmin |V alpha + r|,
+//   x_next = x~ + W alpha    ( = x + r + W alpha ),
+// the fixed-point step, corrected where the columns know how the residual answers.
+// Source: Degroote, Bathe and Vierendeels, Comput. Struct. 87 (2009) 793-801.
+// The columns are orthogonalised from the newest to the oldest; one whose new part is below
+// `filter` of its length only repeats what newer ones say and is left out of this step (QR2 filter
+// of Haelterman et al., Comput. Struct. 171 (2016) 9-17). Without a column: x + initial_relaxation
+// r.
+#pragma once
+
+#include "bridge/acceleration_aitken.hpp"
+
+#include <deque>
+#include <vector>
+
+namespace sluice::bridge {
+
+class QuasiNewton {
+public:
+  QuasiNewton(double initial_relaxation, int windows_reused, double filter = 1e-3)
+      : initial_relaxation_(initial_relaxation),
+        windows_reused_(static_cast<std::size_t>(windows_reused)), filter_(filter) {}
+  AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
+  void finish_window(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
+
+private:
+  struct Column {
+    Eigen::VectorXd residual_change, solution_change;
+  };
+  struct LeastSquares;
+  void remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
+  LeastSquares orthogonalised(Eigen::Index most) const;
+
+  double initial_relaxation_;
+  std::size_t windows_reused_;
+  double filter_;
+  std::deque<std::vector<Column>> history_{1}; // front: this window; in a window the newest is last
+  Eigen::VectorXd last_residual_, last_solved_; // empty at the start of a window
+};
+
+} // namespace sluice::bridge

@@ -1,0 +1,243 @@
+// SPDX-License-Identifier: MIT
+#include "bridge/participant.hpp"
+
+#include "bridge/base/timer.hpp"
+#include "bridge/side.hpp"
+#include "bridge/transport.hpp"
+
+#include <cmath>
+#include <optional>
+
+namespace sluice::bridge {
+
+class Participant::Impl {
+public:
+  Impl(const std::string &name, const Config &config, std::filesystem::path folder,
+       std::unique_ptr<Transport> connected)
+      : role(role_of(name)), case_text(config.canonical_text()),
+        settings(config.read<BridgeSettings>("bridge")),
+        case_settings(config.read<CaseSettings>("case")), clock(case_settings),
+        out_dir(std::move(folder)), transport(std::move(connected)) {
+    std::filesystem::create_directories(out_dir);
+    side = role == Role::fluid ? make_fluid_side(settings) : make_solid_side(settings, out_dir);
+  }
+
+  // Runs one of the participant's calls; a failure is told to the partner before it goes on.
+  template <class Action> void told(Action &&action) {
+    try {
+      action();
+    } catch (const std::exception &error) {
+      give_up(error.what());
+      throw;
+    }
+  }
+  void give_up(std::string_view message) noexcept {
+    if (link && !is_silent)
+      link->send_abort(message);
+    is_silent = true;
+  }
+
+  void set_mesh(InterfaceMesh new_mesh) {
+    check(!link, "bridge: set_mesh comes before initialize");
+    check_mesh(new_mesh, name_of(role));
+    mesh = std::move(new_mesh);
+    for (auto &[field, values] : side->writable)
+      values.assign(mesh.positions.size(), 0.0);
+  }
+
+  void initialize() {
+    check(!mesh.positions.empty(), "bridge: the {} must set_mesh before initialize", name_of(role));
+    check(!link, "bridge: initialize comes once");
+    link = transport ? greet_partner(role, settings, std::move(transport))
+                     : connect_to_partner(role, settings, out_dir);
+    link->start_heartbeat();
+    compare_cases(role, *link, case_text);
+    partner_mesh = side->initialize(*link, mesh);
+    side->await_window(exchange());
+  }
+
+  void advance(double dt) {
+    check(link && !clock.is_over(), "bridge: advance outside the coupled run");
+    check(std::isfinite(dt) && dt > 0 && dt <= clock.left() * (1 + 1e-9),
+          "bridge: a step of {} s, where {} s of window {} are left", dt, clock.left(),
+          clock.window());
+    is_complete = is_rejected = false;
+    if (!clock.step(dt))
+      return;
+    clock.restart_window();
+    if (side->advance(exchange()) == Verdict::converged)
+      complete_window();
+    else
+      repeat_window();
+  }
+
+  void complete_window() {
+    ++statistics.windows;
+    statistics.iterations += iteration;
+    statistics.iterations_max = std::max<long>(statistics.iterations_max, iteration);
+    is_complete = true;
+    iteration = 1;
+    clock.next_window();
+    if (!clock.is_over())
+      side->await_window(exchange());
+  }
+  void repeat_window() {
+    is_rejected = true;
+    ++iteration;
+  }
+
+  Exchange exchange() { return {*link, clock, statistics, iteration, totals}; }
+
+  Role role;
+  std::string case_text;
+  BridgeSettings settings;
+  CaseSettings case_settings;
+  WindowClock clock;
+  std::filesystem::path out_dir;
+  std::unique_ptr<Transport> transport; // until it becomes the link's
+  std::unique_ptr<Side> side;
+  InterfaceMesh mesh, partner_mesh;
+  std::unique_ptr<Link> link;
+  std::optional<WindowTotals> totals;
+  mutable Statistics statistics;
+  int iteration = 1;
+  bool is_complete = false;
+  bool is_rejected = false;
+  bool is_silent = false; // goodbye or abort said
+};
+
+Participant::Participant(std::string name, const Config &config,
+                         const std::filesystem::path &out_dir)
+    : impl_(std::make_unique<Impl>(name, config, out_dir, nullptr)) {}
+
+Participant::Participant(std::string name, const Config &config,
+                         const std::filesystem::path &out_dir, std::unique_ptr<Transport> transport)
+    : impl_(std::make_unique<Impl>(name, config, out_dir, std::move(transport))) {}
+
+Participant::~Participant() {
+  impl_->give_up(fmt::format("the {} ended before the run was complete; its own output says why",
+                             name_of(impl_->role)));
+}
+
+void Participant::set_mesh(InterfaceMesh mesh) { impl_->set_mesh(std::move(mesh)); }
+
+void Participant::initialize() {
+  const Stopwatch watch;
+  impl_->told([&] { impl_->initialize(); });
+  impl_->statistics.initialize_s = watch.seconds();
+}
+
+bool Participant::is_coupling_ongoing() const { return !impl_->clock.is_over(); }
+bool Participant::is_time_window_complete() const { return impl_->is_complete; }
+double Participant::max_time_step_size() const { return impl_->clock.left(); }
+
+bool Participant::requires_writing_checkpoint() const {
+  return impl_->settings.is_implicit() && impl_->iteration == 1 && impl_->clock.elapsed() == 0 &&
+         is_coupling_ongoing();
+}
+bool Participant::requires_reading_checkpoint() const { return impl_->is_rejected; }
+
+namespace {
+
+template <class Fields>
+auto &field_of(Fields &fields, std::string_view name, Role role, std::string_view verb) {
+  const auto found = fields.find(name);
+  if (found != fields.end())
+    return found->second;
+  std::vector<std::string> names;
+  for (const auto &[known, values] : fields)
+    names.push_back(known);
+  fail("bridge: the {} {} {}, not '{}'", name_of(role), verb, fmt::join(names, " and "), name);
+}
+
+void check_size(std::string_view field, std::size_t got, const InterfaceMesh &mesh) {
+  check(got == mesh.positions.size(),
+        "bridge: {} needs {} values ({} nodes with {} components), {} were given", field,
+        mesh.positions.size(), mesh.n_nodes(), mesh.dim, got);
+}
+
+void check_finite(std::string_view field, std::span<const double> values, const InterfaceMesh &mesh,
+                  Role role, double time) {
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    if (std::isfinite(values[k]))
+      continue;
+    const auto node = k / static_cast<std::size_t>(mesh.dim);
+    fail("bridge: the {}'s {} at t = {:.6g} s is not finite: {} at node {}, reference position "
+         "({:.6g}) m",
+         name_of(role), field, time, values[k], node, fmt::join(mesh.position(node), ", "));
+  }
+}
+
+} // namespace
+
+void Participant::write_data(std::string_view field, std::span<const double> values) {
+  impl_->told([&] {
+    auto &written = field_of(impl_->side->writable, field, impl_->role, "writes");
+    check_size(field, values.size(), impl_->mesh);
+    check_finite(field, values, impl_->mesh, impl_->role, time());
+    written.assign(values.begin(), values.end());
+  });
+}
+
+void Participant::read_data(std::string_view field, double relative_time,
+                            std::span<double> values) const {
+  impl_->told([&] {
+    const WindowField &window = field_of(impl_->side->readable, field, impl_->role, "reads");
+    check(impl_->link != nullptr, "bridge: read_data follows initialize");
+    check_size(field, values.size(), impl_->mesh);
+    const WindowClock &clock = impl_->clock;
+    const double length = clock.is_over() ? 1 : clock.window_length();
+    const double s = clock.is_over() ? 0 : (clock.elapsed() + relative_time) / length;
+    check(s >= -1e-9 && s <= 1 + 1e-9,
+          "bridge: {} read at {} s after t = {} s, outside the window of {} s", field,
+          relative_time, time(), length);
+    for (std::size_t k = 0; k < values.size(); ++k)
+      values[k] = s >= 1 ? window.end[k] : window.start[k] + s * (window.end[k] - window.start[k]);
+  });
+}
+
+void Participant::advance(double dt) {
+  const Stopwatch watch;
+  const double waited = impl_->link ? impl_->link->wait_s() : 0;
+  impl_->told([&] { impl_->advance(dt); });
+  impl_->statistics.bridge_s += watch.seconds() - (impl_->link->wait_s() - waited);
+}
+
+void Participant::finalize() {
+  impl_->told([&] {
+    check(impl_->link != nullptr, "bridge: finalize without initialize");
+    check(impl_->clock.is_over(), "bridge: the {} ended its run at t = {:.6g} s, before the end",
+          name_of(impl_->role), time());
+    impl_->side->finalize(impl_->exchange());
+  });
+  impl_->link->stop_heartbeat();
+  impl_->is_silent = true;
+}
+
+void Participant::abort(std::string_view message) noexcept { impl_->give_up(message); }
+
+void Participant::report_totals(const InterfaceTotals &totals) {
+  check(impl_->is_complete, "bridge: report_totals follows an advance that completed a window");
+  impl_->totals = WindowTotals{impl_->clock.window() - 1, totals};
+  impl_->side->add_totals(*impl_->totals, impl_->statistics);
+}
+
+const InterfaceMesh &Participant::mesh() const { return impl_->mesh; }
+const InterfaceMesh &Participant::partner_mesh() const { return impl_->partner_mesh; }
+const MapReport &Participant::map_report() const { return impl_->side->map_report(); }
+const BridgeSettings &Participant::settings() const { return impl_->settings; }
+const CaseSettings &Participant::case_settings() const { return impl_->case_settings; }
+long Participant::time_window() const { return impl_->clock.window(); }
+int Participant::iteration() const { return impl_->iteration; }
+double Participant::time() const { return impl_->clock.time(); }
+
+const Statistics &Participant::statistics() const {
+  if (impl_->link) {
+    impl_->statistics.wait_s = impl_->link->wait_s();
+    impl_->statistics.bytes_sent = impl_->link->bytes_sent();
+    impl_->statistics.bytes_received = impl_->link->bytes_received();
+  }
+  return impl_->statistics;
+}
+
+} // namespace sluice::bridge

@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: MIT
+// What the fluid's and the solid's end of the bridge do differently: which fields they read and
+// write, and what they exchange at connect and at the end of an iteration.
+#pragma once
+
+#include "bridge/balance_log.hpp"
+#include "bridge/connection.hpp"
+#include "bridge/interface_mesh.hpp"
+#include "bridge/link.hpp"
+#include "bridge/mapping.hpp"
+#include "bridge/scheme.hpp"
+#include "bridge/window_clock.hpp"
+
+#include <map>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace sluice::bridge {
+
+/// A field that is read: linear in time over the window.
+struct WindowField {
+  std::vector<double> start, end; ///< at the start of the window; the current iterate at its end
+};
+
+/// What both sides know of the run at an exchange.
+struct Exchange {
+  Link &link;
+  const WindowClock &clock;
+  Statistics &statistics;
+  int iteration;                             ///< of this window, from 1
+  const std::optional<WindowTotals> &totals; ///< own report of the window before
+};
+
+class Side {
+public:
+  virtual ~Side() = default;
+  /// Exchanges meshes (returned: the partner's) and initial data.
+  virtual InterfaceMesh initialize(Link &link, const InterfaceMesh &own) = 0;
+  /// Called once after initialize, and after every completed window but the last: the solid waits
+  /// here for the fluid's forces.
+  virtual void await_window(const Exchange &) {}
+  /// At the end of an iteration; throws UserError for a window that fails.
+  virtual Verdict advance(const Exchange &exchange) = 0;
+  virtual void finalize(const Exchange &exchange) = 0;
+  virtual void add_totals(const WindowTotals &, Statistics &) {}
+  virtual const MapReport &map_report() const = 0;
+
+  std::map<std::string, WindowField, std::less<>> readable;
+  std::map<std::string, std::vector<double>, std::less<>> writable;
+};
+
+std::unique_ptr<Side> make_fluid_side(const BridgeSettings &settings);
+/// Logs its iterations in `out_dir`/coupling.csv.
+std::unique_ptr<Side> make_solid_side(const BridgeSettings &settings,
+                                      const std::filesystem::path &out_dir);
+
+// ---- records that both sides know ---------------------------------------------------------------
+
+void write_mesh(PayloadWriter &write, const InterfaceMesh &mesh);
+InterfaceMesh read_mesh(PayloadReader &read);
+void send_mesh(Link &link, const InterfaceMesh &mesh);
+/// Throws UserError when the partner's mesh is not usable.
+InterfaceMesh receive_mesh(Link &link);
+
+/// Window and iteration lead every record of the loop; throws MalformedMessage when the two
+/// programs are not at the same one.
+void write_position(PayloadWriter &write, const Exchange &exchange);
+void check_position(PayloadReader &read, long window, int iteration);
+/// Reads values of which there must be `n`.
+std::vector<double> read_values(PayloadReader &read, std::size_t n);
+/// As the report is sent: the fluid builds the map, the solid learns what it looks like.
+void write_report(PayloadWriter &write, const MapReport &report);
+MapReport read_report(PayloadReader &read);
+/// Upper bound [bytes] of a record with `n_values` numbers.
+std::size_t record_limit(std::size_t n_values);
+
+} // namespace sluice::bridge

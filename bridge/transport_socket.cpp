@@ -1,0 +1,321 @@
+// SPDX-License-Identifier: MIT
+#include "bridge/transport_socket.hpp"
+
+#include "bridge/base/check.hpp"
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <functional>
+#include <utility>
+
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/socket.h>
+#include <sys/stat.h>
+#include <sys/un.h>
+#include <unistd.h>
+
+namespace sluice::bridge {
+
+namespace {
+
+std::string system_text(int error) { return std::strerror(error); }
+
+// ---- addresses ----------------------------------------------------------------------------------
+
+constexpr std::size_t longest_path = sizeof(sockaddr_un{}.sun_path) - 1;
+
+std::uint64_t hash_of(const std::string &text) { // FNV-1a
+  std::uint64_t h = 0xcbf29ce484222325u;
+  for (const char c : text)
+    h = (h ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
+  return h;
+}
+
+std::string absolute_text(const std::filesystem::path &out_dir) {
+  return std::filesystem::weakly_canonical(std::filesystem::absolute(out_dir)).string();
+}
+
+std::string derived_path(const std::string &folder) {
+  const std::string path = folder + "/bridge.sock";
+  if (path.size() <= longest_path)
+    return path;
+  const char *runtime = std::getenv("XDG_RUNTIME_DIR");
+  const std::string name = fmt::format("/sluice-{:016x}.sock", hash_of(folder));
+  if (runtime && *runtime && std::strlen(runtime) + name.size() <= longest_path)
+    return runtime + name;
+  return "/tmp" + name;
+}
+
+Address unix_address(const BridgeSettings &settings, const std::filesystem::path &out_dir) {
+  Address address;
+  address.path = settings.address.empty() ? derived_path(absolute_text(out_dir)) : settings.address;
+  check(address.path.size() <= longest_path,
+        "bridge.address '{}' has {} characters; a Unix-domain socket's path may have {}",
+        address.path, address.path.size(), longest_path);
+  return address;
+}
+
+Address tcp_address(const BridgeSettings &settings, const std::filesystem::path &out_dir) {
+  if (settings.address.empty())
+    return {Address::Family::tcp, "", "127.0.0.1",
+            std::to_string(20000 + hash_of(absolute_text(out_dir)) % 10000)};
+  const auto colon = settings.address.rfind(':');
+  check(colon != std::string::npos && colon > 0 && colon + 1 < settings.address.size(),
+        "bridge.address '{}': expected host:port, for example 127.0.0.1:20500", settings.address);
+  std::string host = settings.address.substr(0, colon);
+  if (host.size() > 2 && host.front() == '[' && host.back() == ']')
+    host = host.substr(1, host.size() - 2);
+  return {Address::Family::tcp, "", host, settings.address.substr(colon + 1)};
+}
+
+// ---- sockets ------------------------------------------------------------------------------------
+
+// Waits until `events` is possible; false when the deadline passed first.
+bool wait_for(int descriptor, short events, Deadline deadline) {
+  while (true) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::microseconds>(deadline - Clock::now()).count();
+    const auto milliseconds = left <= 0 ? 0 : std::min<long long>(left / 1000 + 1, 1'000'000);
+    pollfd entry{descriptor, events, 0};
+    const int ready = ::poll(&entry, 1, static_cast<int>(milliseconds));
+    if (ready > 0)
+      return true;
+    if (ready < 0 && errno != EINTR)
+      throw ConnectionLost(system_text(errno));
+    if (ready == 0 && left <= 0)
+      return false;
+  }
+}
+
+bool is_temporary(int error) { return error == EAGAIN || error == EWOULDBLOCK || error == EINTR; }
+
+class SocketTransport final : public Transport {
+public:
+  explicit SocketTransport(SocketHandle socket) : socket_(std::move(socket)) {}
+
+  std::size_t write_some(std::span<const std::byte> bytes, Deadline deadline) override {
+    return repeat(POLLOUT, deadline, [&] {
+      return ::send(socket_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
+    });
+  }
+  std::size_t read_some(std::span<std::byte> bytes, Deadline deadline) override {
+    return repeat(POLLIN, deadline, [&] {
+      const auto n = ::recv(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+      if (n == 0)
+        throw ConnectionLost("end of stream");
+      return n;
+    });
+  }
+  bool can_write() override { return wait_for(socket_.get(), POLLOUT, Clock::now()); }
+
+private:
+  // Tries, and sleeps in poll() while the socket has nothing to give or no room.
+  template <class Attempt> std::size_t repeat(short events, Deadline deadline, Attempt &&attempt) {
+    while (true) {
+      if (const auto n = attempt(); n > 0)
+        return static_cast<std::size_t>(n);
+      if (!is_temporary(errno))
+        throw ConnectionLost(system_text(errno));
+      if (!wait_for(socket_.get(), events, deadline))
+        return 0;
+    }
+  }
+  SocketHandle socket_;
+};
+
+SocketHandle open_socket(int family) {
+  SocketHandle socket(::socket(family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  check(socket.is_open(), "a socket cannot be opened: {}", system_text(errno));
+  return socket;
+}
+
+sockaddr_un unix_name(const std::string &path) {
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  std::memcpy(name.sun_path, path.data(), path.size());
+  return name;
+}
+
+template <class Name> const sockaddr *generic(const Name &name) {
+  return reinterpret_cast<const sockaddr *>(&name);
+}
+
+using AddressList = std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)>;
+
+AddressList resolve(const Address &address) {
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_STREAM;
+  addrinfo *list = nullptr;
+  const int error = ::getaddrinfo(address.host.c_str(), address.port.c_str(), &hints, &list);
+  check(error == 0, "bridge.address {}: {}", address.text(), ::gai_strerror(error));
+  return {list, &::freeaddrinfo};
+}
+
+bool is_loopback(const addrinfo &entry) {
+  if (entry.ai_family == AF_INET)
+    return (ntohl(reinterpret_cast<const sockaddr_in *>(entry.ai_addr)->sin_addr.s_addr) >> 24) ==
+           127;
+  if (entry.ai_family == AF_INET6)
+    return IN6_IS_ADDR_LOOPBACK(&reinterpret_cast<const sockaddr_in6 *>(entry.ai_addr)->sin6_addr);
+  return false;
+}
+
+// Small frames both ways, each awaited: never wait to fill a packet.
+void send_at_once(int descriptor) {
+  const int on = 1;
+  ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+}
+
+// The other end of a Unix-domain connection must run under this user (or root).
+bool is_own_user(int descriptor) {
+  ucred peer{};
+  socklen_t size = sizeof peer;
+  if (::getsockopt(descriptor, SOL_SOCKET, SO_PEERCRED, &peer, &size) != 0)
+    return false;
+  return peer.uid == ::geteuid() || peer.uid == 0;
+}
+
+// ---- listening ----------------------------------------------------------------------------------
+
+// A socket file that nobody listens to any more is the leftover of a killed run.
+void remove_stale_file(const std::string &path) {
+  struct stat status {};
+  if (::lstat(path.c_str(), &status) != 0)
+    return;
+  check(S_ISSOCK(status.st_mode),
+        "bridge.address {}: a file that is no socket is in the way; remove it or give another path",
+        path);
+  const SocketHandle probe = open_socket(AF_UNIX);
+  const auto name = unix_name(path);
+  check(::connect(probe.get(), generic(name), sizeof name) != 0 && errno == ECONNREFUSED,
+        "bridge.address {}: another run listens there; end it or give another --out folder", path);
+  ::unlink(path.c_str());
+}
+
+SocketHandle listen_unix(const std::string &path) {
+  remove_stale_file(path);
+  if (const auto folder = std::filesystem::path(path).parent_path(); !folder.empty())
+    std::filesystem::create_directories(folder);
+  SocketHandle socket = open_socket(AF_UNIX);
+  ::fchmod(socket.get(), S_IRUSR | S_IWUSR); // taken over by the file that bind makes
+  const auto name = unix_name(path);
+  check(::bind(socket.get(), generic(name), sizeof name) == 0,
+        "bridge.address {}: cannot listen there: {}", path, system_text(errno));
+  return socket;
+}
+
+SocketHandle listen_tcp(const Address &address, const std::string &token) {
+  const auto list = resolve(address);
+  check(!token.empty() || is_loopback(*list),
+        "bridge.address {} can be reached from other hosts; set bridge.token (or SLUICE_TOKEN on "
+        "both hosts) so that only the partner is let in",
+        address.text());
+  SocketHandle socket = open_socket(list->ai_family);
+  const int on = 1;
+  ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+  check(::bind(socket.get(), list->ai_addr, list->ai_addrlen) == 0,
+        "bridge.address {}: cannot listen there: {}; end the other run or give another address",
+        address.text(), system_text(errno));
+  return socket;
+}
+
+} // namespace
+
+std::string Address::text() const {
+  return family == Family::tcp ? fmt::format("{}:{}", host, port) : path;
+}
+
+Address address_of(const BridgeSettings &settings, const std::filesystem::path &out_dir) {
+  return settings.transport == "tcp" ? tcp_address(settings, out_dir)
+                                     : unix_address(settings, out_dir);
+}
+
+SocketHandle::~SocketHandle() {
+  if (is_open())
+    ::close(descriptor_);
+}
+SocketHandle::SocketHandle(SocketHandle &&other) noexcept
+    : descriptor_(std::exchange(other.descriptor_, -1)) {}
+SocketHandle &SocketHandle::operator=(SocketHandle &&other) noexcept {
+  std::swap(descriptor_, other.descriptor_);
+  return *this;
+}
+
+Listener::Listener(const Address &address, const std::string &token)
+    : socket_(address.family == Address::Family::tcp ? listen_tcp(address, token)
+                                                     : listen_unix(address.path)),
+      path_(address.path) {
+  check(::listen(socket_.get(), 4) == 0, "bridge.address {}: {}", address.text(),
+        system_text(errno));
+}
+
+Listener::~Listener() {
+  if (!path_.empty())
+    ::unlink(path_.c_str());
+}
+
+std::unique_ptr<Transport> Listener::accept(Deadline deadline) {
+  while (wait_for(socket_.get(), POLLIN, deadline)) {
+    SocketHandle peer(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
+    if (!peer.is_open() || (!path_.empty() && !is_own_user(peer.get())))
+      continue;
+    if (path_.empty())
+      send_at_once(peer.get());
+    return std::make_unique<SocketTransport>(std::move(peer));
+  }
+  return nullptr;
+}
+
+namespace {
+
+// Nobody there yet, or a full queue: worth another attempt.
+bool may_mend(int error) {
+  return error == ENOENT || error == ECONNREFUSED || error == EAGAIN || error == ETIMEDOUT ||
+         error == EHOSTUNREACH || error == ENETUNREACH;
+}
+
+// 0, or the error of a connection attempt that ends by the deadline.
+int connect_error(int descriptor, const sockaddr *name, socklen_t size, Deadline deadline) {
+  if (::connect(descriptor, name, size) == 0)
+    return 0;
+  if (errno != EINPROGRESS)
+    return errno;
+  if (!wait_for(descriptor, POLLOUT, deadline))
+    return ETIMEDOUT;
+  int error = 0;
+  socklen_t error_size = sizeof error;
+  ::getsockopt(descriptor, SOL_SOCKET, SO_ERROR, &error, &error_size);
+  return error;
+}
+
+std::unique_ptr<Transport> finished(SocketHandle socket, int error, const Address &address) {
+  check(error == 0 || may_mend(error), "bridge.address {}: cannot connect: {}", address.text(),
+        system_text(error));
+  if (error != 0)
+    return nullptr;
+  return std::make_unique<SocketTransport>(std::move(socket));
+}
+
+} // namespace
+
+std::unique_ptr<Transport> try_connect(const Address &address, Deadline deadline) {
+  if (address.family == Address::Family::unix_domain) {
+    SocketHandle socket = open_socket(AF_UNIX);
+    const auto name = unix_name(address.path);
+    const int error = connect_error(socket.get(), generic(name), sizeof name, deadline);
+    check(error != 0 || is_own_user(socket.get()),
+          "bridge.address {}: another user's program listens there", address.path);
+    return finished(std::move(socket), error, address);
+  }
+  const auto list = resolve(address);
+  SocketHandle socket = open_socket(list->ai_family);
+  send_at_once(socket.get());
+  const int error = connect_error(socket.get(), list->ai_addr, list->ai_addrlen, deadline);
+  return finished(std::move(socket), error, address);
+}
+
+} // namespace sluice::bridge
