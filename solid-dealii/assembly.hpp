@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: MIT
+// Sums the elements: internal force, condensed tangent and mass on the free unknowns.
+//
+// Fixed components (zero, or held at the value given in the displacement) are left out of the
+// matrices by numbering only the free ones. Work arrays and the place of every element entry in the
+// sparse matrix are made once.
+#pragma once
+
+#include "solid-dealii/discretisation.hpp"
+
+#include <Eigen/Sparse>
+
+#include <vector>
+
+namespace sluice::solid {
+
+using SparseMatrix = Eigen::SparseMatrix<double>;
+
+template <int dim> class Assembly {
+public:
+  /// `fixed` has one entry per displacement component. `density` [kg/m^3].
+  Assembly(const Discretisation<dim> &discretisation, Material material, double density,
+           const std::vector<bool> &fixed);
+
+  int n_free() const { return n_free_; }
+  /// The entries of a vector over all components that belong to free ones, and back.
+  Eigen::VectorXd restrict_to_free(const Eigen::VectorXd &all) const;
+  void add_to_free(Eigen::VectorXd &all, double factor, const Eigen::VectorXd &free) const;
+
+  /// Consistent mass [kg] of the free unknowns; same sparsity as the tangent.
+  const SparseMatrix &mass() const { return mass_; }
+  /// Consistent mass applied to a vector over all components, fixed ones included.
+  Eigen::VectorXd mass_times(const Eigen::VectorXd &all) const;
+
+  /// Linearises the internal force at (displacement, modes). Returns the smallest det F; when that
+  /// is not positive the sweep stops and the results below are not valid.
+  double linearise(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes);
+  const SparseMatrix &tangent() const { return tangent_; } ///< [N/m], modes condensed
+  const Eigen::VectorXd &condensed_force() const {
+    return condensed_force_;
+  } ///< [N], all components
+  /// Euclidean norm of the forces on the modes [N]; zero in equilibrium.
+  double mode_residual() const { return mode_residual_; }
+  /// Change of the modes that belongs to a change of all displacement components, by the last
+  /// linearisation.
+  Eigen::VectorXd mode_increment(const Eigen::VectorXd &displacement_increment) const;
+
+  /// Internal force [N] on all components at given modes, nothing condensed. Needs det F > 0.
+  Eigen::VectorXd internal_force(const Eigen::VectorXd &displacement,
+                                 const Eigen::VectorXd &modes) const;
+  /// Smallest det F over all points.
+  double smallest_det(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes) const;
+  /// [J]
+  double strain_energy(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes) const;
+  /// Mean Cauchy stress [Pa] of every cell with its out-of-plane part: xx yy zz xy (xz yz), one
+  /// column per cell.
+  Eigen::MatrixXd mean_stress(const Eigen::VectorXd &displacement,
+                              const Eigen::VectorXd &modes) const;
+  /// Force [N] that round-off alone makes in a stress-free body: below it no residual means
+  /// anything.
+  double round_off_force() const { return round_off_force_; }
+
+  const Discretisation<dim> &discretisation() const { return discretisation_; }
+  const Material &material() const { return material_; }
+
+private:
+  void number_unknowns(const std::vector<bool> &fixed);
+  void build_pattern();
+  void build_mass(double density);
+  void clear();
+  template <int nodes, int modes, class Law>
+  double sweep(const Law &law, const Eigen::VectorXd &displacement,
+               const Eigen::VectorXd &modes_in);
+  template <int nodes, int modes> void scatter(int cell, const Condensed<dim, nodes, modes> &c);
+
+  const Discretisation<dim> &discretisation_;
+  Material material_;
+  int n_free_ = 0;
+  std::vector<int> unknown_of_;   // free unknown of a component, -1 where fixed
+  std::vector<int> place_;        // of an element entry in the matrix values, -1 where fixed
+  std::vector<double> cell_mass_; // [cell][node][node], one component
+  SparseMatrix mass_, tangent_;
+  Eigen::VectorXd condensed_force_;
+  std::vector<double> recovery_; // per cell, see Condensed
+  double mode_residual_ = 0;
+  double round_off_force_ = 0;
+};
+
+} // namespace sluice::solid

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: MIT
+#include "solid-dealii/solid_solver.hpp"
+
+#include "bridge/base/timer.hpp"
+
+#include <Eigen/Eigenvalues>
+
+#include <algorithm>
+#include <numbers>
+
+namespace sluice::solid {
+namespace {
+
+template <int dim> Box<dim> box_of(const SolidParams &p) {
+  if constexpr (dim == 2)
+    return {p.corner, {p.width, p.height}, {p.elements_across, p.elements_along}, {}};
+  else
+    return {{p.corner.x(), p.corner.y(), 0},
+            {p.width, p.height, p.used_depth()},
+            {p.elements_across, p.elements_along, p.elements_deep},
+            {}};
+}
+
+// The clamped side is held fully; the planes near and far hold their normal component (symmetry).
+template <int dim> std::vector<bool> fixed_components(const Discretisation<dim> &d, Side clamped) {
+  std::vector<bool> fixed(static_cast<std::size_t>(d.n_dofs()), false);
+  for (const int node : d.side_nodes(clamped))
+    for (int c = 0; c < dim; ++c)
+      fixed[static_cast<std::size_t>(dim * node + c)] = true;
+  if constexpr (dim == 3)
+    for (const Side side : {Side::near, Side::far})
+      for (const int node : d.side_nodes(side))
+        fixed[static_cast<std::size_t>(dim * node + 2)] = true;
+  return fixed;
+}
+
+} // namespace
+
+Side side_named(std::string_view name) {
+  if (name == "left")
+    return Side::left;
+  if (name == "right")
+    return Side::right;
+  check(name == "lower" || name == "upper",
+        "solid: unknown side '{}'; give left, right, lower or upper", name);
+  return name == "lower" ? Side::lower : Side::upper;
+}
+
+Side opposite(Side side) { return static_cast<Side>(static_cast<int>(side) ^ 1); }
+
+template <int dim>
+SolidSolver<dim>::SolidSolver(const SolidParams &params)
+    : params_(params),
+      discretisation_(discretise(box_of<dim>(params), element_kind(params.element))),
+      assembly_(discretisation_,
+                make_material(params.material, params.youngs_modulus, params.poisson_ratio),
+                params.density, fixed_components(discretisation_, clamped_side())),
+      newton_(assembly_, {params.newton_tolerance, params.newton_max_iterations}),
+      integrator_(params.spectral_radius) {}
+
+template <int dim> SolidState SolidSolver<dim>::initial_state() const {
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(discretisation_.n_dofs());
+  return {zero, zero, zero, Eigen::VectorXd::Zero(discretisation_.n_modes())};
+}
+
+template <int dim>
+NewtonReport SolidSolver<dim>::solve(const Equation &equation, Iterate &iterate) {
+  const Stopwatch watch;
+  const NewtonReport report = newton_.solve(equation, iterate);
+  counts_.seconds += watch.seconds();
+  counts_.iterations += report.iterations;
+  if (report.has_converged) {
+    ++counts_.solves;
+    counts_.iterations_max = std::max(counts_.iterations_max, report.iterations);
+  } else
+    ++counts_.rejected_starts;
+  return report;
+}
+
+template <int dim>
+SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd &load, double dt,
+                                  const SolidState *guess) {
+  check(load.allFinite(), "solid: a nodal force is not finite in step {}", start.step + 1);
+  const Equation equation = integrator_.equation(
+      start, assembly_.internal_force(start.displacement, start.modes), load, dt);
+  // The constant-acceleration predictor can invert an element where the load is rough; the
+  // displacement of the last step cannot.
+  std::vector<Iterate> starts;
+  if (guess)
+    starts.push_back({guess->displacement, guess->modes});
+  starts.push_back({GeneralisedAlpha::predict(start, dt), start.modes});
+  starts.push_back({start.displacement, start.modes});
+  NewtonReport report;
+  for (Iterate &iterate : starts) {
+    report = solve(equation, iterate);
+    if (!report.has_converged)
+      continue;
+    SolidState end = integrator_.finish(start, iterate, dt);
+    end.load_work += load.dot(end.displacement - start.displacement);
+    return end;
+  }
+  fail("solid: step {} of {:.3g} s has no solution: {}; the largest nodal force is {:.3g} N. "
+       "Take a smaller case.time_step_s, or look at the loads",
+       start.step + 1, dt, report.failure, load.size() ? load.cwiseAbs().maxCoeff() : 0.0);
+}
+
+// From equilibrium under no load to equilibrium under all of it; parts are halved and doubled.
+template <int dim>
+void SolidSolver<dim>::raise_load(const Eigen::VectorXd &load, Iterate &iterate) {
+  double reached = 0, part = 1;
+  while (reached < 1) {
+    const double target = std::min(1.0, reached + part);
+    Iterate trial = iterate;
+    const NewtonReport report = solve({1, 0, {}, target * load}, trial);
+    if (report.has_converged) {
+      iterate = std::move(trial);
+      reached = target;
+      part *= 2;
+    } else {
+      part /= 2;
+      check(part > 1e-4,
+            "solid: no equilibrium beyond {:.4g} of the load (largest nodal force {:.3g} N): {}",
+            reached, load.cwiseAbs().maxCoeff(), report.failure);
+    }
+  }
+}
+
+template <int dim> SolidState SolidSolver<dim>::solve_static(const Eigen::VectorXd &load) {
+  SolidState state = initial_state();
+  Iterate iterate{state.displacement, state.modes};
+  raise_load(load, iterate);
+  state.displacement = iterate.displacement;
+  state.modes = iterate.modes;
+  return state;
+}
+
+// The load follows by repeated solution under the load of the last shape, which needs no load
+// stiffness; the part of it that is left out makes the convergence linear.
+template <int dim>
+SolidState SolidSolver<dim>::solve_static_follower(Side side, const Hydrostatic &pressure) {
+  constexpr int max_rounds = 100;
+  SolidState state = initial_state();
+  Eigen::VectorXd load = pressure_forces(discretisation_, side, pressure, state.displacement);
+  for (int round = 0; round < max_rounds; ++round) {
+    state = solve_static(load);
+    const Eigen::VectorXd next =
+        pressure_forces(discretisation_, side, pressure, state.displacement);
+    const double change = (next - load).norm();
+    load = next;
+    if (change <= 1e-10 * load.norm())
+      return state;
+  }
+  fail("solid: the follower load did not settle in {} rounds", max_rounds);
+}
+
+template <int dim>
+Eigen::VectorXd SolidSolver<dim>::consistent_acceleration(const SolidState &state,
+                                                          const Eigen::VectorXd &load) {
+  LinearSolver mass(assembly_.mass());
+  mass.factorise(assembly_.mass());
+  Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(load.size());
+  assembly_.add_to_free(acceleration, 1,
+                        mass.solve(assembly_.restrict_to_free(
+                            load - assembly_.internal_force(state.displacement, state.modes))));
+  return acceleration;
+}
+
+template <int dim>
+std::vector<double> SolidSolver<dim>::frequencies(const SolidState &state, int count) {
+  check(assembly_.n_free() <= 4000,
+        "solid: {} unknowns are too many for the dense eigenvalue problem; use at most 4000",
+        assembly_.n_free());
+  check(assembly_.linearise(state.displacement, state.modes) > 0,
+        "solid: the state whose frequencies are wanted has an inverted element");
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> modes(
+      Eigen::MatrixXd(assembly_.tangent()), Eigen::MatrixXd(assembly_.mass()),
+      Eigen::EigenvaluesOnly);
+  std::vector<double> found;
+  for (int k = 0; k < std::min(count, assembly_.n_free()); ++k)
+    found.push_back(std::sqrt(std::max(0.0, modes.eigenvalues()[k])) / (2 * std::numbers::pi));
+  return found;
+}
+
+template <int dim> double SolidSolver<dim>::kinetic_energy(const SolidState &state) const {
+  return 0.5 * state.velocity.dot(assembly_.mass_times(state.velocity));
+}
+
+template <int dim> double SolidSolver<dim>::strain_energy(const SolidState &state) const {
+  return assembly_.strain_energy(state.displacement, state.modes);
+}
+
+template class SolidSolver<2>;
+template class SolidSolver<3>;
+
+} // namespace sluice::solid

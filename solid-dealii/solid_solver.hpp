@@ -1,0 +1,72 @@
+// SPDX-License-Identifier: MIT
+// The elastic body: built once from its parameters, it turns a state and a load into the next
+// state.
+#pragma once
+
+#include "solid-dealii/loads.hpp"
+#include "solid-dealii/newton.hpp"
+#include "solid-dealii/params.hpp"
+#include "solid-dealii/solid_state.hpp"
+#include "solid-dealii/time_integrator.hpp"
+
+namespace sluice::solid {
+
+/// What the solver has done since it was made.
+struct SolverCounts {
+  long solves = 0;          ///< nonlinear equations solved
+  long iterations = 0;      ///< Newton iterations of all of them
+  int iterations_max = 0;   ///< of one
+  long rejected_starts = 0; ///< first guesses that were inverted or did not converge
+  double seconds = 0;       ///< [s] wall time in them
+};
+
+/// The side that a key's value names: "left", "right", "lower" or "upper".
+Side side_named(std::string_view name);
+Side opposite(Side side);
+
+template <int dim> class SolidSolver {
+public:
+  explicit SolidSolver(const SolidParams &params);
+  SolidSolver(const SolidSolver &) = delete;
+  SolidSolver &operator=(const SolidSolver &) = delete;
+
+  /// At rest, undeformed, no acceleration: the first load finds it in the first step.
+  SolidState initial_state() const;
+
+  /// The state after a step of length `dt` [s] under nodal forces `load` [N] (all components),
+  /// constant over the step. `guess`, an earlier answer for the same step, only saves iterations.
+  /// Throws UserError, with the numbers, when no start leads to a solution.
+  SolidState step(const SolidState &start, const Eigen::VectorXd &load, double dt,
+                  const SolidState *guess = nullptr);
+
+  /// Equilibrium under a dead load, raised in parts where one part is too much.
+  SolidState solve_static(const Eigen::VectorXd &load);
+  /// Equilibrium under a pressure on `side` that stays normal to the deformed surface.
+  SolidState solve_static_follower(Side side, const Hydrostatic &pressure);
+  /// M^-1 (load - f_int) for a load that acts from the start on [m/s^2]; zero on fixed components.
+  Eigen::VectorXd consistent_acceleration(const SolidState &state, const Eigen::VectorXd &load);
+  /// The lowest `count` natural frequencies [Hz] about `state`, by a dense eigenvalue problem.
+  std::vector<double> frequencies(const SolidState &state, int count);
+
+  double kinetic_energy(const SolidState &state) const; ///< [J]
+  double strain_energy(const SolidState &state) const;  ///< [J]
+
+  const Discretisation<dim> &discretisation() const { return discretisation_; }
+  const Assembly<dim> &assembly() const { return assembly_; }
+  const SolidParams &params() const { return params_; }
+  Side clamped_side() const { return side_named(params_.clamped_side); }
+  const SolverCounts &counts() const { return counts_; }
+
+private:
+  NewtonReport solve(const Equation &equation, Iterate &iterate);
+  void raise_load(const Eigen::VectorXd &load, Iterate &iterate);
+
+  SolidParams params_;
+  Discretisation<dim> discretisation_;
+  Assembly<dim> assembly_;
+  Newton<dim> newton_;
+  GeneralisedAlpha integrator_;
+  SolverCounts counts_;
+};
+
+} // namespace sluice::solid
