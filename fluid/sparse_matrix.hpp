@@ -5,6 +5,7 @@
 // sorting).
 #pragma once
 
+#include "fluid/gather.hpp"
 #include "fluid/parallel.hpp"
 
 #include <iosfwd>
@@ -71,20 +72,12 @@ struct SlicedPattern {
   }
 };
 
-/// Sixteen numbers, one per row of a slice.
-template <class Number> using Lanes = std::array<Number, SlicedPattern::lanes>;
-
 /// Products of the rows of slice `s` with x, summed in `Number`.
 template <class Number, class Value, class X>
 Lanes<Number> slice_product(const SlicedPattern &pattern, const Value *value, const X *x, int s) {
-  Lanes<Number> total{};
   const std::size_t begin = static_cast<std::size_t>(pattern.slice_start[s]) * pattern.lanes;
-  const std::size_t end = static_cast<std::size_t>(pattern.slice_start[s + 1]) * pattern.lanes;
-  const int *column = pattern.column.data();
-  for (std::size_t at = begin; at < end; at += pattern.lanes)
-    for (int lane = 0; lane < pattern.lanes; ++lane)
-      total[lane] += Number(value[at + lane]) * Number(x[column[at + lane]]);
-  return total;
+  const int width = pattern.slice_start[s + 1] - pattern.slice_start[s];
+  return gathered_sums<Number>(value + begin, pattern.column.data() + begin, width, x);
 }
 
 /// Calls body(i, sum over j of value_ij x_j) for the rows of `range`, whose begin is a multiple

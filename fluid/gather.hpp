@@ -1,0 +1,86 @@
+// SPDX-License-Identifier: MIT
+// Sums of products with gathered operands, sixteen rows at a time. GCC 12 does not vectorise the
+// gather by itself, hence the AVX-512 twin of each loop; both add in the same order, though fused
+// multiply-add may round differently.
+#pragma once
+
+#include <array>
+#include <cstddef>
+
+#ifdef __AVX512F__
+// GCC 12 takes the undefined lanes inside its own intrinsics for uninitialised variables (bug
+// 105593).
+#pragma GCC diagnostic push
+#pragma GCC diagnostic ignored "-Wuninitialized"
+#pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
+#include <immintrin.h>
+#pragma GCC diagnostic pop
+#endif
+
+namespace sluice::fluid {
+
+/// Sixteen numbers, one per row of a slice.
+template <class Number> using Lanes = std::array<Number, 16>;
+
+/// lane l: sum over k < width of value[16 k + l] * x[column[16 k + l]].
+template <class Number, class Value, class X>
+Lanes<Number> gathered_sums(const Value *value, const int *column, int width, const X *x) {
+  Lanes<Number> total{};
+  for (int k = 0; k < width; ++k, value += 16, column += 16)
+    for (int lane = 0; lane < 16; ++lane)
+      total[lane] += Number(value[lane]) * Number(x[column[lane]]);
+  return total;
+}
+
+#ifdef __AVX512F__
+
+template <>
+inline Lanes<float> gathered_sums<float>(const float *value, const int *column, int width,
+                                         const float *x) {
+  __m512 total = _mm512_setzero_ps();
+  for (int k = 0; k < width; ++k, value += 16, column += 16) {
+    const __m512 operand = _mm512_i32gather_ps(_mm512_loadu_si512(column), x, 4);
+    total = _mm512_fmadd_ps(_mm512_loadu_ps(value), operand, total);
+  }
+  Lanes<float> lanes;
+  _mm512_storeu_ps(lanes.data(), total);
+  return lanes;
+}
+
+template <>
+inline Lanes<double> gathered_sums<double>(const double *value, const int *column, int width,
+                                           const float *x) {
+  __m512d low = _mm512_setzero_pd(), high = _mm512_setzero_pd();
+  for (int k = 0; k < width; ++k, value += 16, column += 16) {
+    const __m512 operand = _mm512_i32gather_ps(_mm512_loadu_si512(column), x, 4);
+    const __m512 swapped = _mm512_shuffle_f32x4(operand, operand, 0b01001110);
+    low = _mm512_fmadd_pd(_mm512_loadu_pd(value), _mm512_cvtps_pd(_mm512_castps512_ps256(operand)),
+                          low);
+    high = _mm512_fmadd_pd(_mm512_loadu_pd(value + 8),
+                           _mm512_cvtps_pd(_mm512_castps512_ps256(swapped)), high);
+  }
+  Lanes<double> lanes;
+  _mm512_storeu_pd(lanes.data(), low);
+  _mm512_storeu_pd(lanes.data() + 8, high);
+  return lanes;
+}
+
+template <>
+inline Lanes<double> gathered_sums<double>(const double *value, const int *column, int width,
+                                           const double *x) {
+  __m512d low = _mm512_setzero_pd(), high = _mm512_setzero_pd();
+  for (int k = 0; k < width; ++k, value += 16, column += 16) {
+    const __m256i first = _mm256_loadu_si256(reinterpret_cast<const __m256i *>(column));
+    const __m256i second = _mm256_loadu_si256(reinterpret_cast<const __m256i *>(column + 8));
+    low = _mm512_fmadd_pd(_mm512_loadu_pd(value), _mm512_i32gather_pd(first, x, 8), low);
+    high = _mm512_fmadd_pd(_mm512_loadu_pd(value + 8), _mm512_i32gather_pd(second, x, 8), high);
+  }
+  Lanes<double> lanes;
+  _mm512_storeu_pd(lanes.data(), low);
+  _mm512_storeu_pd(lanes.data() + 8, high);
+  return lanes;
+}
+
+#endif
+
+} // namespace sluice::fluid
