@@ -30,6 +30,7 @@ struct FluidState {
   std::int64_t wall_returns = 0;   // points put back through a wall so far
   std::int64_t outflow_points = 0; // points that left through the outlet so far
   std::int64_t lost_points = 0;    // points that ended outside except through the outlet
+  double outlet_energy = 0;        // energy of the points that left [J/m]
 };
 
 } // namespace sluice::fluid

@@ -87,6 +87,11 @@ void remove_points(Points &points, const std::vector<char> &leaves) {
 
 } // namespace
 
+double FluidSolver::energy_of_point(const Vec<2> &u, const Vec<2> &x) const {
+  const double mass = params_.density * params_.spacing * params_.spacing;
+  return mass * (0.5 * u.squaredNorm() - params_.gravity.dot(x));
+}
+
 void FluidSolver::leave_through_outlet() {
   Points &points = state.points;
   std::vector<char> leaves(points.size(), 0);
@@ -100,6 +105,8 @@ void FluidSolver::leave_through_outlet() {
     state.outflow_points += is_out;
     state.lost_points += is_lost;
     leaves[i] = is_out || is_lost;
+    if (leaves[i])
+      state.outlet_energy += energy_of_point(points.velocity[i], x);
     any = any || leaves[i];
   }
   if (any)

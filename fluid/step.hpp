@@ -47,10 +47,13 @@ public:
   const StepReport &report() const { return report_; }
   const FluidParams &params() const { return params_; }
   double dt() const { return dt_; }
+  /// Energy that points have carried out of the scene so far [J/m].
+  double outlet_energy() const { return state.outlet_energy; }
   PhaseTimer timer;
 
 private:
   void leave_through_outlet();
+  double energy_of_point(const Vec<2> &u, const Vec<2> &x) const;
   void freeze_cloud();
   void predict_velocity();
   void assemble();

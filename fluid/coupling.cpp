@@ -1,0 +1,162 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/coupling.hpp"
+
+#include "bridge/base/progress.hpp"
+#include "bridge/participant.hpp"
+#include "bridge/run_summary.hpp"
+#include "bridge/settings.hpp"
+#include "fluid/history.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace sluice::fluid {
+
+namespace {
+
+/// The coupled walls as the bridge sees them, and the way back.
+class CoupledSurface {
+public:
+  explicit CoupledSurface(const Walls &walls) : reference_(walls.position) {
+    values_.resize(2 * walls.coupled_vertices.size());
+  }
+
+  bridge::InterfaceMesh mesh(const Walls &walls) const {
+    bridge::InterfaceMesh mesh;
+    std::vector<int> node(walls.position.size(), -1);
+    for (std::size_t k = 0; k < walls.coupled_vertices.size(); ++k) {
+      const Vec<2> &x = walls.position[walls.coupled_vertices[k]];
+      mesh.positions.insert(mesh.positions.end(), {x.x(), x.y()});
+      node[walls.coupled_vertices[k]] = static_cast<int>(k);
+    }
+    for (const int s : walls.coupled_segments)
+      for (const int v : {walls.segments[s].a, walls.segments[s].b})
+        mesh.faces.push_back(node[v]);
+    return mesh;
+  }
+
+  void read_positions(const bridge::Participant &bridge, double relative_time, Walls &walls) {
+    bridge.read_data("displacement", relative_time, values_);
+    for (std::size_t k = 0; k < walls.coupled_vertices.size(); ++k) {
+      const int v = walls.coupled_vertices[k];
+      walls.position[v] = reference_[v] + Vec<2>(values_[2 * k], values_[2 * k + 1]);
+    }
+  }
+
+  void read_velocities(const bridge::Participant &bridge, double relative_time, Walls &walls) {
+    bridge.read_data("velocity", relative_time, values_);
+    for (std::size_t k = 0; k < walls.coupled_vertices.size(); ++k)
+      walls.velocity[walls.coupled_vertices[k]] = {values_[2 * k], values_[2 * k + 1]};
+  }
+
+  void write_forces(bridge::Participant &bridge, const FluidSolver &solver) {
+    for (std::size_t k = 0; k < values_.size() / 2; ++k) {
+      const Vec<2> &f = solver.nodal_forces()[solver.walls.coupled_vertices[k]];
+      values_[2 * k] = f.x();
+      values_[2 * k + 1] = f.y();
+    }
+    bridge.write_data("force", values_);
+  }
+
+private:
+  std::vector<Vec<2>> reference_;
+  std::vector<double> values_;
+};
+
+/// One step alone or one window with a partner.
+class Run {
+public:
+  Run(const Config &config, const std::filesystem::path &folder)
+      : settings_(config.read<bridge::CaseSettings>("case")), scene_(read_scene(config)),
+        solver_(scene_), history_(scene_, solver_, folder, settings_.output_interval),
+        progress_("fluid", settings_.end_time) {}
+
+  void alone() {
+    const long n = settings_.n_windows();
+    for (long window = 1; window <= n; ++window) {
+      solver_.begin_step(settings_.time_step);
+      solver_.iterate();
+      solver_.end_step();
+      finish_step(solver_.walls.position, static_cast<double>(window) * settings_.time_step);
+    }
+  }
+
+  void coupled(bridge::Participant &bridge) {
+    CoupledSurface surface(solver_.walls);
+    bridge.set_mesh(surface.mesh(solver_.walls));
+    bridge.initialize();
+    const bool repeats_step = bridge.settings().iterate == "full";
+    while (bridge.is_coupling_ongoing()) {
+      const double dt = bridge.max_time_step_size();
+      const bool is_first = bridge.iteration() == 1;
+      if (is_first) {
+        surface.read_positions(bridge, 0, solver_.walls);
+        start_ = solver_.walls.position;
+        if (repeats_step)
+          saved_ = solver_.state;
+      } else if (repeats_step) {
+        solver_.state = saved_;
+      }
+      surface.read_velocities(bridge, dt, solver_.walls);
+      if (is_first || repeats_step) {
+        surface.read_positions(bridge, dt, solver_.walls);
+        solver_.begin_step(dt);
+      }
+      solver_.iterate();
+      surface.write_forces(bridge, solver_);
+      bridge.advance(dt);
+      if (!bridge.is_time_window_complete())
+        continue;
+      solver_.end_step();
+      surface.read_positions(bridge, 0, solver_.walls);
+      finish_step(start_, bridge.time());
+    }
+    bridge.finalize();
+  }
+
+  void write_summary(const std::string &message, const nlohmann::json &bridge_summary) const {
+    history_.write_summary(solver_, message, bridge_summary);
+  }
+  bool has_partner() const {
+    return !scene_.walls.coupled_vertices.empty() && scene_.params.coupled_walls == "move";
+  }
+
+private:
+  void finish_step(std::span<const Vec<2>> walls_before, double time) {
+    history_.record(solver_, walls_before, time);
+    progress_.update(time, history_.note());
+  }
+
+  bridge::CaseSettings settings_;
+  Scene scene_;
+  FluidSolver solver_;
+  History history_;
+  Progress progress_;
+  FluidState saved_;
+  std::vector<Vec<2>> start_;
+};
+
+} // namespace
+
+void run(const Config &config, const std::filesystem::path &folder) {
+  Run run(config, folder);
+  std::unique_ptr<bridge::Participant> bridge;
+  const auto statistics = [&] {
+    return bridge ? bridge::summary_of(bridge->statistics()) : nlohmann::json::object();
+  };
+  try {
+    if (run.has_partner()) {
+      bridge = std::make_unique<bridge::Participant>("fluid", config, folder);
+      run.coupled(*bridge);
+    } else {
+      run.alone();
+    }
+  } catch (const std::exception &error) {
+    run.write_summary(error.what(), statistics());
+    if (bridge)
+      bridge->abort(error.what());
+    throw;
+  }
+  run.write_summary("", statistics());
+}
+
+} // namespace sluice::fluid

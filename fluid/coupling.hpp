@@ -1,0 +1,15 @@
+// SPDX-License-Identifier: MIT
+// The adapter: runs the fluid against its partner through the bridge, or alone with walls at rest.
+#pragma once
+
+#include "bridge/base/config.hpp"
+
+#include <filesystem>
+
+namespace sluice::fluid {
+
+/// Runs the case to its end, writing into `folder`. Throws UserError on any failure, after the
+/// summary of what was computed has been written and the partner has been told.
+void run(const Config &config, const std::filesystem::path &folder);
+
+} // namespace sluice::fluid

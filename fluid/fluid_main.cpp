@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// sluice-fluid CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--check]
+#include "fluid/coupling.hpp"
+#include "fluid/parallel.hpp"
+#include "fluid/scene.hpp"
+
+#include <CLI/CLI.hpp>
+#include <cstdlib>
+#include <fmt/format.h>
+
+namespace {
+
+struct Options {
+  std::string case_file, out = "out";
+  std::vector<std::string> overrides;
+  int threads = 0;
+  bool check_only = false;
+};
+
+void run(const Options &options) {
+  using namespace sluice;
+  const Config config = Config::load(options.case_file, options.overrides);
+  if (options.threads > 0)
+    fluid::set_number_of_threads(options.threads);
+  if (options.check_only) {
+    const fluid::Scene scene = fluid::read_scene(config);
+    fmt::print("fluid: {} points, {} wall segments\n", scene.initial.points.size(),
+               scene.walls.segments.size());
+    return;
+  }
+  std::filesystem::create_directories(options.out);
+  fluid::run(config, options.out);
+}
+
+} // namespace
+
+int main(int argc, char **argv) {
+  Options options;
+  CLI::App app{"Meshless free-surface flow: the fluid participant of a case"};
+  app.add_option("case", options.case_file, "case file (.toml)")->required();
+  app.add_option("--set", options.overrides, "TABLE.KEY=VALUE overrides one value; repeatable")
+      ->allow_extra_args(false);
+  app.add_option("--out", options.out, "folder for all output")->capture_default_str();
+  app.add_option("--threads", options.threads, "threads; default: OMP_NUM_THREADS or all cores");
+  app.add_flag("--check", options.check_only, "read everything, build the scene, stop");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    run(options);
+  } catch (const std::exception &error) {
+    fmt::print(stderr, "sluice-fluid: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}

@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/history.hpp"
+
+#include <cmath>
+#include <fstream>
+#include <nlohmann/json.hpp>
+
+namespace sluice::fluid {
+
+namespace {
+
+std::string series_header(const std::vector<GaugeParams> &gauges) {
+  std::string header =
+      "time_s,kinetic_j,potential_j,work_on_walls_j,outlet_energy_j,volume_m2,point_volume_m2,"
+      "tank_volume_m2,tank_point_volume_m2,outflow_past_tip_m2,outflow_m2,max_speed_m_s,"
+      "min_pressure_pa,max_pressure_pa,momentum_x_n_s,momentum_y_n_s,wall_force_x_n,"
+      "wall_force_y_n,guarded_rows,pressure_iterations,wall_returns,lost_points,points";
+  for (const GaugeParams &gauge : gauges)
+    header += ",level_" + gauge.name + "_m";
+  return header;
+}
+
+} // namespace
+
+History::History(const Scene &scene, const FluidSolver &solver, std::filesystem::path folder,
+                 double output_interval)
+    : folder_(std::move(folder)), gauges_(scene.gauges),
+      series_(folder_ / "fluid.csv", series_header(gauges_)),
+      loads_(folder_ / "fluid_loads.csv", "window,time_s,fx_n,fy_n,moment_nm,magnitude_n,"
+                                          "moment_magnitude_nm,work_j,work_magnitude_j"),
+      points_(folder_), walls_(folder_), output_interval_(output_interval) {
+  const FluidParams &params = scene.params;
+  const double mass = params.density * params.spacing * params.spacing;
+  for (const Vec<2> &x : solver.state.points.position)
+    start_.potential -= mass * params.gravity.dot(x);
+  initial_volume_ = solver.state.points.size() * params.spacing * params.spacing;
+  last_ = start_;
+}
+
+void History::record_loads(const FluidSolver &solver, std::span<const Vec<2>> previous,
+                           double time) {
+  const Walls &walls = solver.walls;
+  Vec<2> force = Vec<2>::Zero();
+  double magnitude = 0, moment = 0, moment_magnitude = 0, work = 0, work_magnitude = 0;
+  const auto &samples = solver.quadrature().samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const auto &s = samples[k];
+    const WallSegment &segment = walls.segments[s.segment];
+    const auto at = [&](std::span<const Vec<2>> v) -> Vec<2> {
+      return (1 - s.t) * v[segment.a] + s.t * v[segment.b];
+    };
+    const Vec<2> f = s.length * solver.tractions()[k];
+    const Vec<2> x = at(walls.position), moved = x - at(previous);
+    force += f;
+    magnitude += f.norm();
+    moment += cross(x, f);
+    moment_magnitude += x.norm() * f.norm();
+    work += f.dot(moved);
+    work_magnitude += f.norm() * moved.norm();
+  }
+  work_on_walls_ += work;
+  loads_.row({static_cast<double>(solver.state.step), time, force.x(), force.y(), moment,
+              magnitude, moment_magnitude, work, work_magnitude});
+}
+
+Vec<2> History::force_on_all_walls(const FluidSolver &solver) {
+  const Points &points = solver.state.points;
+  build_wall_quadrature(points, solver.walls, solver.cloud(), WallPart::all, all_walls_);
+  evaluate_tractions(points, solver.walls, solver.cloud(), solver.problem(), points.pressure,
+                     solver.params().viscosity, all_walls_, all_tractions_);
+  return integrate_resultant(all_walls_, all_tractions_).force;
+}
+
+void History::update_extremes(const FluidSolver &solver, const Integrals &now) {
+  const double energy0 = start_.kinetic + start_.potential;
+  const double energy = now.kinetic + now.potential + work_on_walls_ + outlet_energy_;
+  energy_gain_max_ = std::max(energy_gain_max_, (energy - energy0) / std::abs(energy0));
+  volume_drift_max_ =
+      std::max(volume_drift_max_,
+               std::abs(now.tank_volume - now.tank_point_volume) / initial_volume_);
+  guarded_rows_ += solver.report().rows.linear + solver.report().rows.plain;
+  pressure_iterations_ += solver.report().pressure_iterations;
+  pressure_solves_ += solver.report().pressure_solves;
+  ++steps_;
+}
+
+void History::record(const FluidSolver &solver, std::span<const Vec<2>> previous, double time) {
+  record_loads(solver, previous, time);
+  const Integrals now = integrate(solver);
+  const Vec<2> wall_force = force_on_all_walls(solver);
+  outlet_energy_ = solver.outlet_energy();
+  update_extremes(solver, now);
+  const double spacing = solver.params().spacing;
+  const FluidState &state = solver.state;
+  std::vector<double> row{
+      time, now.kinetic, now.potential, work_on_walls_, outlet_energy_, now.volume,
+      now.point_volume, now.tank_volume, now.tank_point_volume,
+      initial_volume_ - now.tank_point_volume,
+      static_cast<double>(state.outflow_points) * spacing * spacing, now.max_speed,
+      now.min_pressure, now.max_pressure, now.momentum.x(), now.momentum.y(), wall_force.x(),
+      wall_force.y(),
+      static_cast<double>(solver.report().rows.linear + solver.report().rows.plain),
+      static_cast<double>(solver.report().pressure_iterations),
+      static_cast<double>(state.wall_returns), static_cast<double>(state.lost_points),
+      static_cast<double>(state.points.size())};
+  for (const GaugeParams &gauge : gauges_)
+    row.push_back(water_level(state.points, gauge.x, spacing));
+  series_.row(row);
+  if (output_interval_ > 0 && (time >= next_output_ - 1e-9 * output_interval_)) {
+    points_.write(state.points, solver.cloud(), state.step, time);
+    walls_.write(solver.walls, state.step, time);
+    next_output_ += output_interval_ * std::ceil((time - next_output_) / output_interval_ + 1e-6);
+  }
+  last_ = now;
+  last_time_ = time;
+}
+
+std::string History::note() const {
+  return fmt::format("t = {:.4f} s, max speed {:.2f} m/s", last_time_, last_.max_speed);
+}
+
+void History::write_summary(const FluidSolver &solver, const std::string &message,
+                            const nlohmann::json &bridge_summary) const {
+  nlohmann::json summary = bridge_summary;
+  const double n = std::max(1L, steps_), wall = watch_.seconds();
+  double own = 0;
+  nlohmann::json phases = nlohmann::json::object();
+  for (const auto &[phase, seconds] : solver.timer.seconds()) {
+    phases[phase] = 1e3 * seconds / n;
+    own += seconds;
+  }
+  const double area = solver.params().spacing * solver.params().spacing;
+  const double energy0 = start_.kinetic + start_.potential;
+  summary["points"] = solver.state.points.size() + solver.state.outflow_points +
+                      solver.state.lost_points;
+  summary["spacing_m"] = solver.params().spacing;
+  summary["steps"] = steps_;
+  summary["end_time_s"] = last_time_;
+  summary["lost_points"] = solver.state.lost_points;
+  summary["outflow_points"] = solver.state.outflow_points;
+  summary["wall_returns"] = solver.state.wall_returns;
+  summary["outflow_m2"] = static_cast<double>(solver.state.outflow_points) * area;
+  summary["wall_time_s"] = wall;
+  summary["cpu_time_s"] = process_cpu_time();
+  summary["ms_per_step_fluid"] = 1e3 * own / n;
+  summary["phases_ms"] = phases;
+  summary["guarded_rows_per_step"] = static_cast<double>(guarded_rows_) / n;
+  summary["pressure_iterations_per_solve"] =
+      static_cast<double>(pressure_iterations_) / std::max(1L, pressure_solves_);
+  summary["volume_drift_max"] = volume_drift_max_;
+  summary["energy_gain_max"] = energy_gain_max_;
+  summary["energy_drift"] =
+      (last_.kinetic + last_.potential + work_on_walls_ + outlet_energy_ - energy0) /
+      std::abs(energy0);
+  summary["completed"] = message.empty();
+  if (!message.empty())
+    summary["message"] = message;
+  std::ofstream(folder_ / "fluid_summary.json") << summary.dump(2) << '\n';
+}
+
+} // namespace sluice::fluid

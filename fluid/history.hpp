@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: MIT
+// What a run leaves behind: one row per step in fluid.csv and fluid_loads.csv, fields at intervals,
+// and fluid_summary.json at the end, also of a run that failed.
+#pragma once
+
+#include "bridge/base/csv.hpp"
+#include "fluid/diagnostics.hpp"
+#include "fluid/output_vtk.hpp"
+
+#include <filesystem>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+
+namespace sluice::fluid {
+
+class History {
+public:
+  History(const Scene &scene, const FluidSolver &solver, std::filesystem::path folder,
+          double output_interval);
+
+  /// Records the step that has just ended at `time` [s]; `previous` are the wall positions at its
+  /// start and walls.position those at its end [m].
+  void record(const FluidSolver &solver, std::span<const Vec<2>> previous, double time);
+  /// Writes fluid_summary.json. `message` is empty for a complete run.
+  void write_summary(const FluidSolver &solver, const std::string &message,
+                     const nlohmann::json &bridge_summary) const;
+  /// Short text for the progress line.
+  std::string note() const;
+
+private:
+  void record_loads(const FluidSolver &solver, std::span<const Vec<2>> previous, double time);
+  Vec<2> force_on_all_walls(const FluidSolver &solver);
+  void update_extremes(const FluidSolver &solver, const Integrals &now);
+
+  std::filesystem::path folder_;
+  std::vector<GaugeParams> gauges_;
+  CsvWriter series_, loads_;
+  PointOutput points_;
+  WallOutput walls_;
+  double output_interval_, next_output_ = 0;
+  Stopwatch watch_;
+
+  // running sums
+  double work_on_walls_ = 0, outlet_energy_ = 0, last_time_ = 0;
+  Integrals start_, last_;
+  Vec<2> last_force_{0, 0};
+  long guarded_rows_ = 0, steps_ = 0, pressure_iterations_ = 0, pressure_solves_ = 0;
+  double volume_drift_max_ = 0, energy_gain_max_ = -1e300, momentum_error_max_ = 0;
+  double initial_volume_ = 0;
+  WallQuadrature all_walls_;
+  std::vector<Vec<2>> all_tractions_;
+};
+
+} // namespace sluice::fluid
