@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "solid-dealii/alone.hpp"
+
+#include "bridge/base/progress.hpp"
+#include "bridge/settings.hpp"
+#include "solid-dealii/history.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <cmath>
+
+namespace sluice::solid {
+namespace {
+
+// The water stands on the side of smaller x (a body clamped left or right: on its lower side).
+Side wet_side(Side clamped) {
+  return clamped == Side::left || clamped == Side::right ? Side::lower : Side::left;
+}
+
+template <int dim>
+void print_tip(const char *what, const SolidSolver<dim> &s, const SolidState &x) {
+  const auto end = free_end(s.discretisation(), s.clamped_side());
+  const Vec<dim> middle = end.middle(x.displacement), front = end.at(x.displacement, end.front),
+                 back = end.at(x.displacement, end.back);
+  fmt::print("{}: tip ux {:.4f} mm, uy {:.4f} mm (front {:.4f} {:.4f}, back {:.4f} {:.4f})\n", what,
+             1e3 * middle.x(), 1e3 * middle.y(), 1e3 * front.x(), 1e3 * front.y(), 1e3 * back.x(),
+             1e3 * back.y());
+}
+
+template <int dim> double tip_x(const SolidSolver<dim> &s, const SolidState &x) {
+  return free_end(s.discretisation(), s.clamped_side()).middle(x.displacement).x();
+}
+
+template <int dim> Eigen::VectorXd dead_load(const SolidSolver<dim> &s, const Hydrostatic &water) {
+  return pressure_forces(s.discretisation(), wet_side(s.clamped_side()), water,
+                         s.initial_state().displacement);
+}
+
+template <int dim> void run_static(SolidSolver<dim> &s, const Hydrostatic &water) {
+  print_tip("follower pressure", s, s.solve_static_follower(wet_side(s.clamped_side()), water));
+  print_tip("dead pressure", s, s.solve_static(dead_load(s, water)));
+}
+
+template <int dim> void run_modes(SolidSolver<dim> &s) {
+  for (const double f : s.frequencies(s.initial_state(), 5))
+    fmt::print("{:.4f} Hz\n", f);
+}
+
+template <int dim>
+void run_release(SolidSolver<dim> &s, const Hydrostatic &water,
+                 const bridge::CaseSettings &settings, const std::filesystem::path &folder) {
+  std::filesystem::create_directories(folder);
+  History<dim> history(s, folder, settings.output_interval);
+  Progress progress("solid", settings.end_time);
+  const Eigen::VectorXd load = dead_load(s, water);
+  SolidState state = s.initial_state();
+  state.acceleration = s.consistent_acceleration(state, load);
+  const double cpu_start = process_cpu_time();
+  double highest = 0;
+  for (long window = 1; window <= settings.n_windows(); ++window) {
+    const SolidState start = state;
+    state = s.step(start, load, settings.time_step);
+    const double time = static_cast<double>(window) * settings.time_step;
+    history.record(start, state, load, time);
+    progress.update(time, history.note());
+    highest = std::max(highest, tip_x(s, state));
+  }
+  history.write_summary("", nlohmann::json::object());
+  const double n = static_cast<double>(s.counts().solves);
+  print_tip("at the end", s, state);
+  fmt::print(
+      "largest tip ux {:.4f} mm; {:.0f} steps, {:.3f} ms each in Newton ({:.2f} iterations), "
+      "{:.3f} ms CPU each with output\n",
+      1e3 * highest, n, 1e3 * s.counts().seconds / n,
+      static_cast<double>(s.counts().iterations) / n, 1e3 * (process_cpu_time() - cpu_start) / n);
+}
+
+template <int dim>
+void run_task(const std::string &task, const SolidParams &params, const Config &config,
+              const Hydrostatic &water, const std::filesystem::path &folder) {
+  SolidSolver<dim> solver(params);
+  if (task == "static")
+    run_static(solver, water);
+  else if (task == "modes")
+    run_modes(solver);
+  else
+    run_release(solver, water, config.read<bridge::CaseSettings>("case"), folder);
+}
+
+} // namespace
+
+void run_alone(const std::string &task, const Config &config, const Hydrostatic &water,
+               const std::filesystem::path &folder) {
+  check(task == "static" || task == "modes" || task == "release",
+        "--alone {}: unknown task; give static, modes or release", task);
+  const auto params = config.read<SolidParams>("solid");
+  if (params.dimension == 2)
+    run_task<2>(task, params, config, water, folder);
+  else
+    run_task<3>(task, params, config, water, folder);
+}
+
+} // namespace sluice::solid

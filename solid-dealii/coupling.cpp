@@ -1,0 +1,113 @@
+// SPDX-License-Identifier: MIT
+#include "solid-dealii/coupling.hpp"
+
+#include "bridge/base/progress.hpp"
+#include "bridge/participant.hpp"
+#include "bridge/run_summary.hpp"
+#include "solid-dealii/history.hpp"
+
+#include <nlohmann/json.hpp>
+
+namespace sluice::solid {
+namespace {
+
+/// One coupled run.
+template <int dim> class Run {
+public:
+  Run(const SolidParams &params, const bridge::CaseSettings &settings,
+      const std::filesystem::path &folder)
+      : solver_(params),
+        surface_(wetted_interface(solver_.discretisation(), solver_.clamped_side())),
+        history_(solver_, folder, settings.output_interval), progress_("solid", settings.end_time),
+        state_(solver_.initial_state()), forces_(dim * surface_.nodes.size()) {}
+
+  void coupled(bridge::Participant &bridge) {
+    bridge.set_mesh(surface_.mesh);
+    bridge.initialize();
+    while (bridge.is_coupling_ongoing()) {
+      if (bridge.iteration() == 1) {
+        start_ = state_;
+        guess_.reset();
+      }
+      const double dt = bridge.max_time_step_size();
+      read_forces(bridge, dt);
+      state_ = solver_.step(start_, load_, dt, guess_ ? &*guess_ : nullptr);
+      write_motion(bridge);
+      bridge.advance(dt);
+      if (bridge.requires_reading_checkpoint()) {
+        guess_ = state_; // the next iterate is near: only its Newton iterations are saved
+        state_ = start_;
+      } else if (bridge.is_time_window_complete()) {
+        finish_window(bridge);
+      }
+    }
+    bridge.finalize();
+  }
+
+  void write_summary(std::string_view message, const bridge::Participant &bridge) const {
+    history_.write_summary(message, bridge::summary_of(bridge.statistics()));
+  }
+
+private:
+  void read_forces(const bridge::Participant &bridge, double relative_time) {
+    bridge.read_data("force", relative_time, forces_);
+    load_ = surface_.scatter(forces_, solver_.discretisation().n_dofs());
+  }
+
+  void write_motion(bridge::Participant &bridge) const {
+    bridge.write_data("displacement", surface_.gather(state_.displacement));
+    bridge.write_data("velocity", surface_.gather(state_.velocity));
+  }
+
+  // Sums from the solver's own load vector, about the accepted configuration.
+  void finish_window(bridge::Participant &bridge) {
+    std::vector<double> positions = surface_.gather(state_.displacement);
+    for (std::size_t k = 0; k < positions.size(); ++k)
+      positions[k] += surface_.mesh.positions[k];
+    bridge.report_totals(
+        bridge::interface_totals(dim, positions, surface_.gather(load_),
+                                 surface_.gather(state_.displacement - start_.displacement)));
+    history_.record(start_, state_, load_, bridge.time());
+    progress_.update(bridge.time(), history_.note());
+  }
+
+  SolidSolver<dim> solver_;
+  Interface<dim> surface_;
+  History<dim> history_;
+  Progress progress_;
+  SolidState state_, start_;        // now, and at the start of the window
+  std::optional<SolidState> guess_; // the last iterate of the same window
+  std::vector<double> forces_;
+  Eigen::VectorXd load_;
+};
+
+template <int dim>
+void run_in(bridge::Participant &bridge, const SolidParams &params,
+            const std::filesystem::path &folder) {
+  Run<dim> run(params, bridge.case_settings(), folder);
+  try {
+    run.coupled(bridge);
+  } catch (const std::exception &error) {
+    bridge.abort(error.what());
+    run.write_summary(error.what(), bridge);
+    throw;
+  }
+  run.write_summary("", bridge);
+}
+
+} // namespace
+
+void run(bridge::Participant &bridge, const Config &config, const std::filesystem::path &folder) {
+  const auto params = config.read<SolidParams>("solid");
+  if (params.dimension == 2)
+    run_in<2>(bridge, params, folder);
+  else
+    run_in<3>(bridge, params, folder);
+}
+
+void run(const Config &config, const std::filesystem::path &folder) {
+  bridge::Participant bridge("solid", config, folder);
+  run(bridge, config, folder);
+}
+
+} // namespace sluice::solid
