@@ -4,6 +4,7 @@
 #include "bridge/base/check.hpp"
 
 #include <array>
+#include <cstdlib>
 #include <fstream>
 #include <regex>
 #include <sstream>

@@ -20,6 +20,7 @@ MINIMUM_JUDGED_FROM_S = 0.4
 BALANCE_BAND = 1e-12
 ENERGY_GAIN_BAND = 0.003
 VOLUME_BAND = 0.01
+MOMENTUM_BAND = 0.01
 
 PUBLISHED = {  # names in the reference file -> how they are shown
     "antoci2007_sph": "Antoci 2007, SPH",
@@ -160,10 +161,39 @@ def not_judged(tip):
     return ""
 
 
-def energy_gain(fluid):
-    """Largest rise of the fluid's energy, work on the gate included, over its start, relative to it:
-    (before the gap opens, afterwards); None where there is no sample."""
+def total_energy(fluid):
+    """Of the water, with what it has given to the gate and carried out through the outlet [J/m]."""
     total = fluid["kinetic_j"] + fluid["potential_j"] + fluid["work_on_walls_j"]
+    return total + fluid.get("outlet_energy_j", 0.0)
+
+
+def momentum_balance(run, fluid):
+    """Change of the water's momentum against its weight and the force on all walls, relative to
+    rho g H^2 / 2: (largest over the windows, of the whole run's impulses). Until water leaves
+    through the outlet, which carries momentum with it; None without the columns for it."""
+    needed = ("momentum_x_n_s", "momentum_y_n_s", "wall_force_x_n", "wall_force_y_n",
+              "point_volume_m2")
+    inside = fluid["outflow_m2"] <= 0
+    if any(name not in fluid for name in needed) or inside.sum() < 2:
+        return None, None
+    scene = run.case()["fluid"]
+    gravity, density = np.array(scene["gravity_m_s2"]), scene["density_kg_m3"]
+    depth = np.ptp(np.array(scene["water_m"])[:, 1])
+    scale = 0.5 * density * np.linalg.norm(gravity) * depth**2
+    momentum = np.column_stack([fluid["momentum_x_n_s"], fluid["momentum_y_n_s"]])[inside]
+    on_walls = np.column_stack([fluid["wall_force_x_n"], fluid["wall_force_y_n"]])[inside]
+    weight = density * fluid["point_volume_m2"][inside, None] * gravity
+    window = np.diff(fluid["time_s"][inside])[:, None]
+    missing = np.diff(momentum, axis=0) - window * (weight - on_walls)[1:]
+    of_windows = np.linalg.norm(missing / window, axis=1) / scale
+    of_run = np.linalg.norm(missing.sum(axis=0)) / window.sum() / scale
+    return float(of_windows.max()), float(of_run)
+
+
+def energy_gain(fluid):
+    """Largest rise of the fluid's energy over its start, relative to it: (before the gap opens,
+    afterwards); None where there is no sample."""
+    total = total_energy(fluid)
     if len(total) == 0 or total[0] == 0:
         return None, None
     gain = total / total[0] - 1
@@ -189,6 +219,11 @@ def warnings(run, results):
     gain = results.get("energy_gain_after_opening")
     if gain is not None and gain > 0:
         found.append(f"energy is {100 * gain:.2f} % above the start after the gap has opened")
+    momentum = results.get("momentum_balance_max")
+    if momentum is not None and momentum > MOMENTUM_BAND:
+        found.append(f"momentum misses {100 * momentum:.2f} % of rho g H^2/2 in one window "
+                     f"(above {100 * MOMENTUM_BAND:g} %), "
+                     f"{100 * results['momentum_balance_mean']:.2f} % over the run")
     drift = run.summary.get("volume_drift_max")
     if drift is not None and abs(drift) > VOLUME_BAND:
         found.append(f"the water's volume drifts by {100 * drift:.2f} %, "

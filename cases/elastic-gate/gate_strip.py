@@ -19,7 +19,7 @@ GATE_FACE, GATE_EDGE = "#D9D9D9", "#000000"
 
 def frames(run):
     """[(time, cloud file, solid file or None)] at the strip's instants, as far as the run went."""
-    clouds, solids = run.collection("fluid"), dict(run.collection("solid"))
+    clouds, solids = run.collection("fluid"), run.collection("solid")
     chosen = []
     for k in range(int(round(clouds[-1][0] / INTERVAL_S)) + 1):
         time, file = min(clouds, key=lambda entry: abs(entry[0] - k * INTERVAL_S))
@@ -29,7 +29,8 @@ def frames(run):
 
 
 def solid_at(solids, time):
-    return next((file for t, file in solids.items() if abs(t - time) < 1e-9), None)
+    """The gate at the cloud's instant; the writers round times differently."""
+    return next((file for t, file in solids if abs(t - time) < 1e-3 * INTERVAL_S), None)
 
 
 def draw(run):

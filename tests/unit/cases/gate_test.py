@@ -14,6 +14,7 @@ from pathlib import Path
 import paths
 import gate
 import gate_strip
+import numpy as np
 import synthetic_gate_run
 from run_folder import RunError, RunFolder
 
@@ -136,6 +137,42 @@ class ValidateTest(RunTest):
         (self.path / "tip.csv").write_text("time_s,ux_m,uy_m\n")
         with self.assertRaisesRegex(RunError, "first window"):
             gate.read_tip(RunFolder(self.path))
+
+
+class BalanceTest(RunTest):
+    def fluid_in_free_fall(self, wall_force):
+        """1.4e-2 m2 of water that falls for 0.1 s while the walls get `wall_force` [N/m]."""
+        time = np.linspace(0.01, 0.1, 10)
+        mass = 1000 * 0.014
+        zero = 0 * time
+        return {"time_s": time, "momentum_x_n_s": zero, "momentum_y_n_s": -mass * 9.81 * time,
+                "wall_force_x_n": zero, "wall_force_y_n": zero + wall_force,
+                "point_volume_m2": zero + 0.014, "outflow_m2": zero}
+
+    def test_free_fall_keeps_the_momentum_balance(self):
+        run = RunFolder(self.write())
+        largest, mean = gate.momentum_balance(run, self.fluid_in_free_fall(0.0))
+        self.assertLess(max(largest, mean), 1e-13)
+
+    def test_force_on_a_wall_that_no_momentum_answers_is_seen(self):
+        run = RunFolder(self.write())
+        scale = 0.5 * 1000 * 9.81 * 0.14**2
+        largest, mean = gate.momentum_balance(run, self.fluid_in_free_fall(-0.02 * scale))
+        self.assertAlmostEqual(largest, 0.02)
+        self.assertAlmostEqual(mean, 0.02)
+
+    def test_run_without_the_columns_has_no_balance(self):
+        run = RunFolder(self.write())
+        self.assertEqual(gate.momentum_balance(run, run.series("fluid.csv")), (None, None))
+
+    def test_energy_that_left_through_the_outlet_counts(self):
+        one = np.ones(3)
+        fluid = {"kinetic_j": 0 * one, "potential_j": np.array([1.0, 0.9, 0.8]),
+                 "work_on_walls_j": 0 * one, "outlet_energy_j": np.array([0.0, 0.1, 0.3]),
+                 "outflow_past_tip_m2": np.array([0.0, 0.0, 0.1])}
+        before, after = gate.energy_gain(fluid)
+        self.assertAlmostEqual(before, 0.0)
+        self.assertAlmostEqual(after, 0.1)
 
 
 class PlotTest(RunTest):
