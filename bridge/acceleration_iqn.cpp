@@ -52,9 +52,18 @@ QuasiNewton::LeastSquares QuasiNewton::orthogonalised(Eigen::Index most) const {
   return system;
 }
 
+void QuasiNewton::distrust(const Eigen::VectorXd &residual) {
+  const double size = residual.norm();
+  if (last_residual_.size() == 0)
+    first_residual_ = size;
+  else if (size > first_residual_)
+    history_.resize(1);
+}
+
 // A change of rounding size carries no direction.
 void QuasiNewton::remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved) {
   const Eigen::VectorXd residual = solved - iterate;
+  distrust(residual);
   if (last_residual_.size() > 0) {
     const Eigen::VectorXd change = residual - last_residual_;
     if (change.norm() > 1e-14 * solved.norm())

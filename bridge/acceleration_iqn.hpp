@@ -21,7 +21,7 @@ namespace sluice::bridge {
 
 class QuasiNewton {
 public:
-  QuasiNewton(double initial_relaxation, int windows_reused, double filter = 1e-3)
+  QuasiNewton(double initial_relaxation, int windows_reused, double filter = 1e-2)
       : initial_relaxation_(initial_relaxation),
         windows_reused_(static_cast<std::size_t>(windows_reused)), filter_(filter) {}
   AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
@@ -32,6 +32,7 @@ private:
     Eigen::VectorXd residual_change, solution_change;
   };
   struct LeastSquares;
+  void distrust(const Eigen::VectorXd &residual);
   void remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
   LeastSquares orthogonalised(Eigen::Index most) const;
 
@@ -39,6 +40,7 @@ private:
   std::size_t windows_reused_;
   double filter_;
   std::deque<std::vector<Column>> history_{1}; // front: this window; in a window the newest is last
+  double first_residual_ = 0;                  // norm, of this window [m]
   Eigen::VectorXd last_residual_, last_solved_; // empty at the start of a window
 };
 

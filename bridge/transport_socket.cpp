@@ -36,7 +36,8 @@ std::uint64_t hash_of(const std::string &text) { // FNV-1a
 }
 
 std::string absolute_text(const std::filesystem::path &out_dir) {
-  return std::filesystem::weakly_canonical(std::filesystem::absolute(out_dir)).string();
+  const auto path = std::filesystem::weakly_canonical(std::filesystem::absolute(out_dir));
+  return (path.has_filename() ? path : path.parent_path()).string(); // "out/" is "out"
 }
 
 std::string derived_path(const std::string &folder) {

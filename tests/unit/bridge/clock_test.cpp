@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: MIT
+#include "bridge/window_clock.hpp"
+#include "piston.hpp"
+
+namespace sluice::bridge {
+namespace {
+
+CaseSettings times(double end, double step) {
+  CaseSettings settings;
+  settings.end_time = end;
+  settings.time_step = step;
+  return settings;
+}
+
+TEST(WindowClock, many_windows_end_exactly_at_the_end) {
+  WindowClock clock(times(0.4, 2e-4));
+  int n = 0;
+  for (; !clock.is_over(); ++n) {
+    EXPECT_EQ(clock.window_length(), 2e-4);
+    EXPECT_TRUE(clock.step(clock.left()));
+    clock.next_window();
+  }
+  EXPECT_EQ(n, 2000);
+  EXPECT_EQ(clock.time(), 0.4);
+}
+
+TEST(WindowClock, the_last_window_is_what_is_left) {
+  WindowClock clock(times(1.0, 0.3));
+  std::vector<double> lengths;
+  for (; !clock.is_over(); clock.next_window())
+    lengths.push_back(clock.window_length());
+  ASSERT_EQ(lengths.size(), 4u);
+  EXPECT_EQ(lengths[2], 0.3);
+  EXPECT_NEAR(lengths[3], 0.1, 1e-15);
+}
+
+TEST(WindowClock, sub_steps_add_up_to_the_window) {
+  WindowClock clock(times(1.0, 0.1));
+  for (int k = 0; k < 6; ++k)
+    EXPECT_FALSE(clock.step(0.1 / 7));
+  EXPECT_NEAR(clock.left(), 0.1 / 7, 1e-16);
+  EXPECT_TRUE(clock.step(0.1 / 7));
+}
+
+// A solid that takes two steps in a window sees the force at each and exchanges once.
+TEST(Participant, sub_steps_read_linearly_in_time_and_exchange_at_the_end_of_the_window) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.windows = 4;
+  piston.bridge_keys = "scheme = \"serial-explicit\"\n";
+  auto ends = local_transports();
+  std::thread fluid([&] {
+    Participant bridge("fluid", piston.config(), folder.path(), std::move(ends.first));
+    bridge.set_mesh(solid_line());
+    bridge.initialize();
+    for (int window = 1; window <= 4; ++window) {
+      bridge.write_data("force", std::vector<double>(8, 10.0 * window));
+      bridge.advance(bridge.max_time_step_size());
+    }
+    bridge.finalize();
+  });
+  Participant bridge("solid", piston.config(), folder.path(), std::move(ends.second));
+  bridge.set_mesh(solid_line());
+  bridge.initialize();
+  std::vector<double> force(8);
+  for (int step = 0; step < 8; ++step) {
+    const double half = piston.time_step / 2;
+    bridge.read_data("force", half, force);
+    EXPECT_NEAR(force[0], 5.0 * (step + 1), 1e-12) << step;
+    EXPECT_NEAR(bridge.time(), step * half, 1e-15);
+    bridge.advance(half);
+    EXPECT_EQ(bridge.is_time_window_complete(), step % 2 == 1);
+  }
+  EXPECT_FALSE(bridge.is_coupling_ongoing());
+  bridge.finalize();
+  fluid.join();
+}
+
+} // namespace
+} // namespace sluice::bridge

@@ -1,0 +1,154 @@
+// SPDX-License-Identifier: MIT
+// Two participants in two threads, coupled from the first window to the last.
+#include "bridge/balance_log.hpp"
+#include "bridge/run_summary.hpp"
+#include "bridge/transport_local.hpp"
+#include "piston.hpp"
+
+#include <nlohmann/json.hpp>
+
+#include <fstream>
+
+namespace sluice::bridge {
+namespace {
+
+void expect_closed_form(const Piston &piston, const Outcome &outcome, double tolerance) {
+  ASSERT_EQ(outcome.fluid_error + outcome.solid_error, "");
+  ASSERT_EQ(outcome.history.size(), static_cast<std::size_t>(piston.windows));
+  for (int k = 0; k < piston.windows; ++k)
+    EXPECT_NEAR(outcome.history[static_cast<std::size_t>(k)], piston.exact(k + 1),
+                tolerance * piston.start)
+        << "window " << k + 1;
+}
+
+TEST(Participant, the_coupled_piston_follows_the_closed_form) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.bridge_keys = "displacement_tolerance = 1e-10\nforce_tolerance = 1e-9\n";
+  const Outcome outcome = run_both(piston, folder.path(), true);
+  expect_closed_form(piston, outcome, 1e-8);
+  EXPECT_EQ(outcome.solid.windows, 100);
+  EXPECT_EQ(outcome.fluid.windows, 100);
+  EXPECT_EQ(outcome.fluid.iterations, outcome.solid.iterations);
+  EXPECT_LE(outcome.solid.iterations_max, 6);
+}
+
+TEST(Participant, the_transports_and_the_start_order_give_the_same_bits) {
+  const TemporaryFolder folder;
+  Piston piston;
+  const Outcome local = run_both(piston, folder.path(), true);
+  expect_closed_form(piston, local, 1e-3);
+  piston.bridge_keys = "transport = \"unix\"\n";
+  EXPECT_EQ(run_both(piston, folder.path(), false).history, local.history);
+  piston.bridge_keys = "transport = \"tcp\"\n";
+  EXPECT_EQ(run_both(piston, folder.path(), false).history, local.history);
+}
+
+TEST(Participant, aitken_follows_the_closed_form) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.bridge_keys = "acceleration = \"aitken\"\n";
+  expect_closed_form(piston, run_both(piston, folder.path(), true), 1e-3);
+}
+
+// The largest distance from the closed form, relative to the amplitude.
+double explicit_error(double time_step) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.added_mass = 0.2;
+  piston.stiffness = 100;
+  piston.time_step = time_step;
+  piston.windows = static_cast<int>(std::lround(0.4 / time_step));
+  piston.bridge_keys = "scheme = \"serial-explicit\"\n";
+  const Outcome outcome = run_both(piston, folder.path(), true);
+  EXPECT_EQ(outcome.fluid_error + outcome.solid_error, "");
+  EXPECT_EQ(outcome.solid.iterations, piston.windows) << "one pass per window";
+  double largest = 0;
+  for (int k = 0; k < piston.windows; ++k)
+    largest = std::max(
+        largest, std::abs(outcome.history[static_cast<std::size_t>(k)] - piston.exact(k + 1)));
+  return largest / piston.start;
+}
+
+TEST(Participant, the_explicit_scheme_converges_in_first_order_with_light_water) {
+  const double coarse = explicit_error(1e-3), fine = explicit_error(5e-4);
+  EXPECT_LE(coarse, 0.02);
+  EXPECT_NEAR(coarse / fine, 2, 0.1);
+}
+
+TEST(Participant, the_explicit_scheme_fails_with_heavy_water_at_any_step) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.bridge_keys = "scheme = \"serial-explicit\"\n";
+  piston.windows = 20;
+  const Outcome outcome = run_both(piston, folder.path(), true);
+  EXPECT_TRUE(outcome.history.empty() || std::abs(outcome.history.back()) > 10 * piston.start);
+}
+
+TEST(Participant, both_ends_balance_force_moment_and_work) {
+  const TemporaryFolder folder;
+  const Outcome outcome = run_both(Piston(), folder.path(), true);
+  EXPECT_GE(outcome.solid.force_balance_max, 0);
+  EXPECT_LE(outcome.solid.force_balance_max, 1e-14);
+  EXPECT_LE(outcome.solid.moment_balance_max, 1e-14);
+  EXPECT_LE(outcome.solid.work_balance_max, 1e-12);
+  EXPECT_EQ(outcome.map.coverage(), 1);
+  std::ifstream balance(folder.path() / "balance.csv");
+  EXPECT_EQ(std::count(std::istreambuf_iterator<char>(balance), {}, '\n'), 101);
+}
+
+TEST(BalanceLog, compares_a_window_when_both_sides_have_reported_it) {
+  const TemporaryFolder folder;
+  BalanceLog log(folder.path() / "balance.csv");
+  Statistics statistics;
+  InterfaceTotals fluid{{3, 4, 0}, {0, 0, 2}, 0.5, 5, 2, 1}, solid = fluid;
+  log.add_fluid({1, fluid}, statistics);
+  EXPECT_EQ(statistics.force_balance_max, -1);
+  log.add_solid({1, solid}, statistics);
+  EXPECT_EQ(statistics.force_balance_max, 0);
+  solid.force[1] += 0.05;
+  solid.moment[2] -= 0.04;
+  solid.work += 0.003;
+  log.add_solid({2, solid}, statistics);
+  log.add_fluid({2, fluid}, statistics);
+  EXPECT_NEAR(statistics.force_balance_max, 0.01, 1e-12);
+  EXPECT_NEAR(statistics.moment_balance_max, 0.02, 1e-12);
+  EXPECT_NEAR(statistics.work_balance_max, 0.003, 1e-12);
+}
+
+TEST(Participant, the_log_has_one_row_per_iteration) {
+  const TemporaryFolder folder;
+  const Outcome outcome = run_both(Piston(), folder.path(), true);
+  std::ifstream log(folder.path() / "coupling.csv");
+  std::string header;
+  std::getline(log, header);
+  EXPECT_EQ(header, "window,iteration,time_s,displacement_residual,force_residual,relaxation,"
+                    "columns,converged");
+  EXPECT_EQ(std::count(std::istreambuf_iterator<char>(log), {}, '\n'), outcome.solid.iterations);
+}
+
+TEST(Participant, the_summary_has_the_keys_that_scripts_read) {
+  const TemporaryFolder folder;
+  const Outcome outcome = run_both(Piston(), folder.path(), true);
+  const auto summary = summary_of(outcome.solid);
+  EXPECT_EQ(summary["windows"], 100);
+  EXPECT_EQ(summary["failed_windows"], 0);
+  EXPECT_EQ(summary["coupling_iterations_max"], outcome.solid.iterations_max);
+  EXPECT_GT(summary["coupling_iterations_mean"], 1.0);
+  for (const auto *key : {"ms_per_step_bridge", "wait_s", "force_balance_max", "work_balance_max"})
+    EXPECT_TRUE(summary.contains(key)) << key;
+}
+
+TEST(Participant, no_socket_file_is_left_behind_and_a_stale_one_is_no_obstacle) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.windows = 3;
+  for (int run = 0; run < 2; ++run) {
+    const Outcome outcome = run_both(piston, folder.path(), false);
+    EXPECT_EQ(outcome.fluid_error + outcome.solid_error, "");
+    EXPECT_FALSE(std::filesystem::exists(folder.path() / "bridge.sock"));
+  }
+}
+
+} // namespace
+} // namespace sluice::bridge

@@ -1,0 +1,82 @@
+// SPDX-License-Identifier: MIT
+// What several tests of the bridge share.
+#pragma once
+
+#include "bridge/base/check.hpp"
+#include "bridge/base/config.hpp"
+#include "bridge/interface_mesh.hpp"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <random>
+#include <string>
+#include <unistd.h>
+#include <vector>
+
+namespace sluice::bridge {
+
+inline bool contains(const std::string &text, std::string_view part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// The message of the UserError that `action` throws; "" when it throws none.
+template <class Action> std::string error_of(Action &&action) {
+  try {
+    action();
+  } catch (const UserError &error) {
+    return error.what();
+  }
+  return "";
+}
+
+/// A folder of this test's own, removed at the end.
+class TemporaryFolder {
+public:
+  TemporaryFolder() {
+    std::string name = (std::filesystem::temp_directory_path() / "sluice-test-XXXXXX").string();
+    path_ = ::mkdtemp(name.data());
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    std::filesystem::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder &) = delete;
+  TemporaryFolder &operator=(const TemporaryFolder &) = delete;
+  const std::filesystem::path &path() const { return path_; }
+
+private:
+  std::filesystem::path path_;
+};
+
+inline std::vector<double> random_values(std::size_t n, unsigned seed, double size = 1) {
+  std::mt19937 engine(seed);
+  std::uniform_real_distribution<double> uniform(-size, size);
+  std::vector<double> values(n);
+  for (double &v : values)
+    v = uniform(engine);
+  return values;
+}
+
+/// The segments of a polyline through `points`.
+inline InterfaceMesh polyline(const std::vector<Vec<2>> &points) {
+  InterfaceMesh mesh;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    mesh.positions.insert(mesh.positions.end(), {points[k].x(), points[k].y()});
+    if (k > 0)
+      mesh.faces.insert(mesh.faces.end(), {static_cast<int>(k) - 1, static_cast<int>(k)});
+  }
+  return mesh;
+}
+
+/// Corner points `a` and `b` of a straight line with `n` segments of unequal length.
+inline std::vector<Vec<2>> uneven_line(const Vec<2> &a, const Vec<2> &b, int n, double unevenness) {
+  std::vector<Vec<2>> points;
+  for (int k = 0; k <= n; ++k) {
+    const double s = static_cast<double>(k) / n;
+    points.push_back(a + (s + unevenness * s * (1 - s)) * (b - a));
+  }
+  return points;
+}
+
+} // namespace sluice::bridge
