@@ -91,7 +91,7 @@ def show_state(text):
 
 
 def quietly(command, title, log):
-    """Runs a build command; its output goes to `log` and is shown only when it fails."""
+    """Runs a build command and returns its output, which goes to `log`; shown when it fails."""
     environment = dict(os.environ, NINJA_STATUS="[%f/%t] ")
     started = time.monotonic()
     process = subprocess.Popen(command, cwd=ROOT, text=True, env=environment, errors="replace",
@@ -109,6 +109,7 @@ def quietly(command, title, log):
         print("".join(lines[-LINES_OF_A_FAILED_BUILD:]), end="", file=sys.stderr)
         print(f"cases/run: {title} failed; the whole output is in {log}", file=sys.stderr)
         sys.exit(EXIT_FAILED)
+    return lines
 
 
 def build():
@@ -117,7 +118,9 @@ def build():
     log.write_text("")
     print("building ...", flush=True)
     started = time.monotonic()
-    quietly(["cmake", "--preset", "release"], "configuring", log)
+    for line in quietly(["cmake", "--preset", "release"], "configuring", log):
+        if "SKIPPED" in line:
+            print(line.removeprefix("--").strip())
     quietly(["cmake", "--build", "--preset", "release", "--target", "programs",
              "-j", str(os.cpu_count() or 1)], "building", log)
     print(f"built in {time.monotonic() - started:.0f} s")

@@ -47,10 +47,10 @@ std::string entries_of(const std::string &collection, std::string_view part, std
   for (auto it = std::sregex_iterator(collection.begin(), collection.end(), data_set);
        it != std::sregex_iterator(); ++it)
     // ParaView takes 0.04 and 0.040000000000000001 for two instants: one spelling for all parts
-    entries += fmt::format(
-        "    <DataSet timestep=\"{:.9g}\" part=\"{}\" name=\"{}\" file=\"{}\"/>\n",
-        std::strtod(attribute(it->str(), "timestep").c_str(), nullptr), number, part,
-        attribute(it->str(), "file"));
+    entries +=
+        fmt::format("    <DataSet timestep=\"{:.9g}\" part=\"{}\" name=\"{}\" file=\"{}\"/>\n",
+                    std::strtod(attribute(it->str(), "timestep").c_str(), nullptr), number, part,
+                    attribute(it->str(), "file"));
   return entries;
 }
 

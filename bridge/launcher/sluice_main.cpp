@@ -82,6 +82,14 @@ std::string indented(const std::string &text) {
   return out;
 }
 
+void print_failure(const Outcome &outcome) {
+  fmt::print(stderr, "  {}: {}\n", outcome.participant, outcome.how_it_ended());
+  if (!outcome.message.empty())
+    fmt::print(stderr, "{}\n", indented(outcome.message));
+  else if (!outcome.was_stopped)
+    fmt::print(stderr, "    (no message)\n");
+}
+
 void report_failures(const RunOutcome &outcome, const Case &scene, const fs::path &folder) {
   if (outcome.signal != 0)
     fmt::print(stderr, "sluice: {} was stopped by signal {}\n", scene.name, outcome.signal);
@@ -89,8 +97,7 @@ void report_failures(const RunOutcome &outcome, const Case &scene, const fs::pat
     fmt::print(stderr, "sluice: {} failed\n", scene.name);
   for (const Outcome &participant : outcome.participants)
     if (!participant.ok())
-      fmt::print(stderr, "  {}: {}\n{}\n", participant.participant, participant.how_it_ended(),
-                 indented(participant.message.empty() ? "(no message)" : participant.message));
+      print_failure(participant);
   fmt::print(stderr, "  output so far and the logs: {}\n", folder.string());
 }
 
@@ -156,8 +163,7 @@ void print_check(const Outcome &outcome) {
   if (outcome.ok())
     fmt::print("{}: OK\n", outcome.participant);
   else
-    fmt::print(stderr, "{}: {}\n{}\n", outcome.participant, outcome.how_it_ended(),
-               indented(outcome.message.empty() ? "(no message)" : outcome.message));
+    print_failure(outcome);
 }
 
 int check_case(const Options &options) {
