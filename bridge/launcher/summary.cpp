@@ -47,7 +47,8 @@ bool takes_the_largest(std::string_view key) {
 
 // These are measured here, or need a rule of their own.
 bool is_not_copied(std::string_view key) {
-  return key == "wall_time_s" || key == "cpu_time_s" || key == "phases_ms" || key == "completed";
+  return key == "wall_time_s" || key == "cpu_time_s" || key == "phases_ms" || key == "completed" ||
+         key == "message";
 }
 
 Json read_partial(const fs::path &file) {

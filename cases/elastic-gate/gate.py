@@ -17,6 +17,7 @@ PEAK_BAND_M = (0.033, 0.050)
 MINIMUM_BAND_M = (0.020, 0.045)
 PEAK_JUDGED_FROM_S = 0.2     # every published curve has its peak before
 MINIMUM_JUDGED_FROM_S = 0.4
+NO_OUTFLOW_M2 = 1e-9         # round-off of areas; one point is at least a hundred times as large
 BALANCE_BAND = 1e-12
 ENERGY_GAIN_BAND = 0.003
 VOLUME_BAND = 0.01
@@ -151,13 +152,13 @@ def band_check(what, value, band):
 
 
 def not_judged(tip):
-    """A sentence about what a short run leaves open; empty for a long one."""
+    """A remark on what a short run leaves open; empty for a long one."""
     if tip.ux.end < PEAK_JUDGED_FROM_S - 1e-9:
-        return (f"The run ends at {tip.ux.end:.3g} s: peak and minimum are not judged "
-                f"(they need {PEAK_JUDGED_FROM_S:g} and {MINIMUM_JUDGED_FROM_S:g} s).")
+        return (f"the run ends at {tip.ux.end:.3g} s: peak and minimum are not judged "
+                f"(they need {PEAK_JUDGED_FROM_S:g} and {MINIMUM_JUDGED_FROM_S:g} s)")
     if tip.ux.end < MINIMUM_JUDGED_FROM_S - 1e-3:
-        return (f"The run ends at {tip.ux.end:.3g} s: the minimum after the peak is not judged "
-                f"(it needs {MINIMUM_JUDGED_FROM_S:g} s).")
+        return (f"the run ends at {tip.ux.end:.3g} s: the minimum after the peak is not judged "
+                f"(it needs {MINIMUM_JUDGED_FROM_S:g} s)")
     return ""
 
 
@@ -173,7 +174,7 @@ def momentum_balance(run, fluid):
     through the outlet, which carries momentum with it; None without the columns for it."""
     needed = ("momentum_x_n_s", "momentum_y_n_s", "wall_force_x_n", "wall_force_y_n",
               "point_volume_m2")
-    inside = fluid["outflow_m2"] <= 0
+    inside = fluid["outflow_m2"] <= NO_OUTFLOW_M2
     if any(name not in fluid for name in needed) or inside.sum() < 2:
         return None, None
     scene = run.case()["fluid"]
@@ -197,7 +198,7 @@ def energy_gain(fluid):
     if len(total) == 0 or total[0] == 0:
         return None, None
     gain = total / total[0] - 1
-    is_open = fluid["outflow_past_tip_m2"] > 0
+    is_open = fluid["outflow_past_tip_m2"] > NO_OUTFLOW_M2
     before, after = gain[~is_open], gain[is_open]
     return (float(before.max()) if len(before) else None,
             float(after.max()) if len(after) else None)

@@ -11,7 +11,7 @@ from vtk_files import read_cloud, read_outline
 
 INTERVAL_S = 0.04
 VIEW_MM = ((-4.0, 330.0), (-5.0, 158.0))
-COLUMNS = 3
+COLUMNS, PICTURE_IN = 3, 3.2
 COLOURS = "viridis"
 WALL = "#4D4D4D"
 GATE_FACE, GATE_EDGE = "#D9D9D9", "#000000"
@@ -29,24 +29,25 @@ def frames(run):
 
 
 def solid_at(solids, time):
-    """The gate at the cloud's instant; the writers round times differently."""
-    return next((file for t, file in solids if abs(t - time) < 1e-3 * INTERVAL_S), None)
+    """The gate nearest to the cloud's instant, None when it is not near; the first pictures of the
+    two may be one window apart."""
+    near = [(abs(t - time), file) for t, file in solids if abs(t - time) < 0.05 * INTERVAL_S]
+    return min(near)[1] if near else None
 
 
 def draw(run):
     case = run.case()
     shown = frames(run)
-    rows = -(-(len(shown) + 1) // COLUMNS)  # one cell for the colour bar
+    columns = min(COLUMNS, len(shown) + 1)   # one cell for the colour bar
+    rows = -(-(len(shown) + 1) // columns)
     aspect = np.ptp(VIEW_MM[1]) / np.ptp(VIEW_MM[0])
-    width = 9.6
-    figure, axes = new_figure(width, rows * (width / COLUMNS) * aspect * 1.03, rows, COLUMNS,
+    figure, axes = new_figure(columns * PICTURE_IN, rows * PICTURE_IN * aspect * 1.03, rows, columns,
                               gridspec_kw={"wspace": 0.04, "hspace": 0.03})
     axes = axes.ravel()
     colour = Normalize(0, hydrostatic_pressure(case))
     for k, (ax, (time, cloud, solid)) in enumerate(zip(axes, shown)):
         draw_frame(ax, case, time, cloud, solid, colour)
-        is_lowest = k + COLUMNS >= len(shown)
-        label_axes(ax, left=k % COLUMNS == 0, below=is_lowest)
+        label_axes(ax, left=k % columns == 0, below=k + columns >= len(shown))
     for ax in axes[len(shown):]:
         ax.set_axis_off()
     draw_colour_bar(figure, axes[len(shown)], colour)

@@ -155,10 +155,11 @@ def fluid_values(run):
 
 
 def read_outcome(setting, folder, stopped_by, known):
-    """`known` holds what the run's folder does not: date, commit, wall time."""
+    """`known` holds what the run's folder does not: date, commit, and the wall time if it ended early."""
     run = RunFolder(folder)
     tip, reached = tip_values(run)
     s = run.summary
+    known = {**known, "wall_time_s": s.get("wall_time_s") or known["wall_time_s"]}
     return Outcome(
         **asdict(setting), completed=bool(s.get("completed")) and not stopped_by,
         reached_s=reached, cause=stopped_by or first_failure(s), **known,
