@@ -54,7 +54,7 @@ def what_was_run(run):
     lines = [f"- case file: `{s.get('case_file')}`"]
     if s.get("overrides"):
         lines.append("- overrides: " + ", ".join(f"`{o}`" for o in s["overrides"]))
-    scene = [f"end {case['case'].get('end_time_s'):g} s", f"window {case['case'].get('time_step_s'):g} s"]
+    scene = [f"end {case['case']['end_time_s']:g} s", f"window {case['case']['time_step_s']:g} s"]
     if "fluid" in case:
         scene.append(f"spacing {1e3 * case['fluid']['spacing_m']:g} mm")
     if "bridge" in case:

@@ -41,8 +41,8 @@ def draw(run):
     columns = min(COLUMNS, len(shown) + 1)   # one cell for the colour bar
     rows = -(-(len(shown) + 1) // columns)
     aspect = np.ptp(VIEW_MM[1]) / np.ptp(VIEW_MM[0])
-    figure, axes = new_figure(columns * PICTURE_IN, rows * PICTURE_IN * aspect * 1.03, rows, columns,
-                              gridspec_kw={"wspace": 0.04, "hspace": 0.03})
+    figure, axes = new_figure(columns * PICTURE_IN, rows * PICTURE_IN * aspect * 1.03,
+                              rows, columns, gridspec_kw={"wspace": 0.04, "hspace": 0.03})
     axes = axes.ravel()
     colour = Normalize(0, hydrostatic_pressure(case))
     for k, (ax, (time, cloud, solid)) in enumerate(zip(axes, shown)):

@@ -9,6 +9,7 @@ short leaves what it has.
 import csv
 import datetime
 import json
+import shutil
 import signal
 import subprocess
 import time
@@ -155,7 +156,7 @@ def fluid_values(run):
 
 
 def read_outcome(setting, folder, stopped_by, known):
-    """`known` holds what the run's folder does not: date, commit, and the wall time if it ended early."""
+    """`known` holds what the run's folder does not: date, commit, wall time from outside."""
     run = RunFolder(folder)
     tip, reached = tip_values(run)
     s = run.summary
@@ -170,6 +171,7 @@ def read_outcome(setting, folder, stopped_by, known):
 
 
 def run_anew(setting, folder, limit_s):
+    shutil.rmtree(folder, ignore_errors=True)  # a run that does not start leaves nothing to read
     started = time.monotonic()
     stopped_by = execute(setting, folder, limit_s)
     known = {"wall_time_s": time.monotonic() - started, "commit": commit(),
@@ -271,8 +273,8 @@ def origin(outcomes):
               if line.startswith("model name")]
     dates = sorted({o.date for o in outcomes})
     commits = sorted({o.commit for o in outcomes})
-    return f"Measured on {', '.join(dates)}; {len(models)} x {models[0] if models else 'unknown'}; " \
-           f"commit {', '.join(commits)}."
+    machine = f"{len(models)} x {models[0] if models else 'unknown processor'}"
+    return f"Measured on {', '.join(dates)}; {machine}; commit {', '.join(commits)}."
 
 
 def write_tables(name, outcomes, table, folder):

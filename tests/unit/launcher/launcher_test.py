@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: MIT
-"""`sluice run` and `sluice check` with stand-ins for the solvers: small scripts that end well, fail,
-hang or draw a progress bar.    launcher_test.py PATH_OF_SLUICE"""
+"""`sluice run` and `sluice check` with stand-ins for the solvers: small scripts that end well,
+fail, hang or draw a progress bar.    launcher_test.py PATH_OF_SLUICE"""
 
 import json
 import os
@@ -35,7 +35,8 @@ while [ $# -gt 0 ]; do
   case $1 in --out) out=$2; shift;; --check) mode=check;; esac; shift
 done
 """
-WELL = 'echo "{\\"steps\\": 3, \\"failed_windows\\": 0, \\"completed\\": true}" > $out/${part}_summary.json\n'
+WELL = """echo '{"steps": 3, "failed_windows": 0, "completed": true}' > $out/${part}_summary.json
+"""
 HANG = "while :; do sleep 0.05; done\n"
 
 
@@ -90,7 +91,8 @@ class CompleteRunTest(LauncherTest):
             self.program(part, f"echo '{text}' > $out/{part}_summary.json\n")
         self.run_case()
         self.assertEqual(self.summary()["failed_windows"], 2)
-        self.assertEqual(self.summary()["phases_ms"], {"fluid": {"solve": 1}, "solid": {"solve": 2}})
+        self.assertEqual(self.summary()["phases_ms"],
+                         {"fluid": {"solve": 1}, "solid": {"solve": 2}})
 
     def test_a_participant_that_says_it_is_not_complete_fails_the_run(self):
         self.program("fluid", "echo '{\"completed\": false}' > $out/fluid_summary.json\n")
@@ -133,8 +135,9 @@ class CompleteRunTest(LauncherTest):
 
     def test_collections_become_one_with_a_part_each(self):
         for part, instant in (("fluid", "0.5"), ("solid", "0.50000000000000011")):
-            self.program(part, WELL + f"echo '<Collection><DataSet timestep=\"{instant}\" part=\"0\" "
-                         f"file=\"{part}_1.vtp\"/></Collection>' > $out/{part}.pvd\n")
+            entry = f'<DataSet timestep="{instant}" part="0" file="{part}_1.vtp"/>'
+            self.program(part, WELL +
+                         f"echo '<Collection>{entry}</Collection>' > $out/{part}.pvd\n")
         self.run_case()
         text = (self.out / "gate.pvd").read_text()
         self.assertIn('<DataSet timestep="0.5" part="0" name="fluid" file="fluid_1.vtp"/>', text)
@@ -155,7 +158,8 @@ class CompleteRunTest(LauncherTest):
 
 class FailedRunTest(LauncherTest):
     def test_message_and_name_of_the_failed_participant_are_shown(self):
-        self.program("solid", "echo noise >&2; echo 'sluice-solid: element 7 is inverted' >&2; exit 4\n")
+        self.program("solid", "echo noise >&2\n"
+                     "echo 'sluice-solid: element 7 is inverted' >&2; exit 4\n")
         done = self.run_case()
         self.assertEqual(done.returncode, 1)
         self.assertIn("solid: exit status 4\n    sluice-solid: element 7 is inverted", done.stderr)
