@@ -74,7 +74,8 @@ def draw_frame(ax, case, time, cloud_file, solid_file, colour):
     ax.set(xlim=VIEW_MM[0], ylim=VIEW_MM[1], aspect="equal")
     ax.grid(False)
     ax.spines[["top", "right", "left", "bottom"]].set_visible(False)
-    ax.text(0.97, 0.93, f"{time:.2f} s", transform=ax.transAxes, ha="right", va="top")
+    ax.text(0.97, 0.93, f"{time:.2f} s", transform=ax.transAxes, ha="right", va="top", zorder=6,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.85, "pad": 1.5})
 
 
 def draw_walls(ax, case):
