@@ -56,9 +56,9 @@ public:
   /// column per cell.
   Eigen::MatrixXd mean_stress(const Eigen::VectorXd &displacement,
                               const Eigen::VectorXd &modes) const;
-  /// Force [N] that round-off alone makes in a stress-free body: below it no residual means
-  /// anything.
-  double round_off_force() const { return round_off_force_; }
+  /// Force [N] that round-off alone makes where a stiffness k and c times the mass act on
+  /// `displacement`: below it no residual means anything. Valid after linearise.
+  double round_off_force(double k, double c, const Eigen::VectorXd &displacement) const;
 
   const Discretisation<dim> &discretisation() const { return discretisation_; }
   const Material &material() const { return material_; }
@@ -83,7 +83,7 @@ private:
   Eigen::VectorXd condensed_force_;
   std::vector<double> recovery_; // per cell, see Condensed
   double mode_residual_ = 0;
-  double round_off_force_ = 0;
+  double stiffest_ = 0; // [N/m] largest diagonal entry of an element before condensation
 };
 
 } // namespace sluice::solid

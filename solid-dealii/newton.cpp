@@ -28,12 +28,14 @@ typename Newton<dim>::Residual Newton<dim>::evaluate(const Equation &equation,
     r.force += inertia;
     r.reference = std::max(r.reference, assembly_.restrict_to_free(inertia).norm());
   }
+  r.round_off = assembly_.round_off_force(equation.internal_factor, equation.mass_factor,
+                                          iterate.displacement);
   r.norm = std::hypot(assembly_.restrict_to_free(r.force).norm(), assembly_.mode_residual());
   return r;
 }
 
 template <int dim> bool Newton<dim>::is_small(const Residual &r) const {
-  return r.norm <= std::max(settings_.tolerance * r.reference, 4 * assembly_.round_off_force());
+  return r.norm <= std::max(settings_.tolerance * r.reference, r.round_off);
 }
 
 template <int dim> bool Newton<dim>::factorise(const Equation &equation) {

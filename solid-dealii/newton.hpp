@@ -60,6 +60,7 @@ private:
     Eigen::VectorXd force; // R, all components
     double norm = 0;
     double reference = 0;
+    double round_off = 0; // norms below it mean nothing
   };
   Residual evaluate(const Equation &equation, const Iterate &iterate);
   Iterate increment(const Residual &residual) const;

@@ -65,9 +65,7 @@ template <int dim> SolidState SolidSolver<dim>::initial_state() const {
 
 template <int dim>
 NewtonReport SolidSolver<dim>::solve(const Equation &equation, Iterate &iterate) {
-  const Stopwatch watch;
   const NewtonReport report = newton_.solve(equation, iterate);
-  counts_.seconds += watch.seconds();
   counts_.iterations += report.iterations;
   if (report.has_converged) {
     ++counts_.solves;
@@ -81,6 +79,7 @@ template <int dim>
 SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd &load, double dt,
                                   const SolidState *guess) {
   check(load.allFinite(), "solid: a nodal force is not finite in step {}", start.step + 1);
+  const Stopwatch watch;
   const Equation equation = integrator_.equation(
       start, assembly_.internal_force(start.displacement, start.modes), load, dt);
   // The constant-acceleration predictor can invert an element where the load is rough; the
@@ -97,6 +96,7 @@ SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd
       continue;
     SolidState end = integrator_.finish(start, iterate, dt);
     end.load_work += load.dot(end.displacement - start.displacement);
+    counts_.seconds += watch.seconds();
     return end;
   }
   fail("solid: step {} of {:.3g} s has no solution: {}; the largest nodal force is {:.3g} N. "

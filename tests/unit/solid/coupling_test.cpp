@@ -1,0 +1,212 @@
+// SPDX-License-Identifier: MIT
+// The adapter against a scripted fluid in another thread, and what a run leaves behind.
+#include "gate.hpp"
+
+#include "bridge/participant.hpp"
+#include "bridge/transport.hpp"
+#include "bridge/transport_local.hpp"
+#include "solid-dealii/coupling.hpp"
+#include "solid-dealii/interface.hpp"
+
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include <fstream>
+#include <sstream>
+#include <thread>
+
+namespace sluice::solid {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char *case_text = R"([case]
+name = "test"
+end_time_s = 4e-3
+time_step_s = 2e-4
+output_interval_s = 1e-3
+[bridge]
+scheme = "serial-implicit"
+max_iterations = 30
+[solid]
+corner_m = [0.1, 0]
+width_m = 0.005
+height_m = 0.079
+elements_across = 1
+elements_along = 28
+density_kg_m3 = 1100
+youngs_modulus_pa = 12e6
+poisson_ratio = 0.4
+)";
+
+// The fluid's side: the same mesh as the solid's, and forces by `force_of(velocity)`.
+template <class Force>
+void scripted_fluid(const Config &config, std::unique_ptr<bridge::Transport> transport,
+                    const fs::path &folder, Force force_of) {
+  SolidSolver<2> solver(gate_params());
+  const auto surface = wetted_interface(solver.discretisation(), Side::upper);
+  bridge::Participant bridge("fluid", config, folder, std::move(transport));
+  bridge.set_mesh(surface.mesh);
+  bridge.initialize();
+  std::vector<double> velocity(2 * surface.nodes.size());
+  while (bridge.is_coupling_ongoing()) {
+    const double dt = bridge.max_time_step_size();
+    bridge.read_data("velocity", dt, velocity);
+    bridge.write_data("force", force_of(surface, solver, velocity));
+    bridge.advance(dt);
+  }
+  bridge.finalize();
+}
+
+struct Outcome {
+  std::string solid_error, fluid_error;
+  fs::path folder;
+};
+
+template <class Force> Outcome couple(const std::string &name, Force force_of) {
+  const Config config = Config::parse(case_text, "case.toml");
+  Outcome outcome{"", "", fs::path(testing::TempDir()) / name};
+  fs::remove_all(outcome.folder);
+  fs::create_directories(outcome.folder);
+  auto [ours, theirs] = bridge::local_transports();
+  std::thread fluid([&, transport = std::move(theirs)]() mutable {
+    try {
+      scripted_fluid(config, std::move(transport), outcome.folder, force_of);
+    } catch (const std::exception &error) {
+      outcome.fluid_error = error.what();
+    }
+  });
+  try {
+    bridge::Participant bridge("solid", config, outcome.folder, std::move(ours));
+    run(bridge, config, outcome.folder);
+  } catch (const std::exception &error) {
+    outcome.solid_error = error.what();
+  }
+  fluid.join();
+  return outcome;
+}
+
+std::vector<std::vector<double>> read_csv(const fs::path &file) {
+  std::ifstream in(file);
+  std::vector<std::vector<double>> rows;
+  std::string line;
+  for (std::getline(in, line); std::getline(in, line);) {
+    rows.emplace_back();
+    std::stringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');)
+      rows.back().push_back(std::stod(cell));
+  }
+  return rows;
+}
+
+nlohmann::json read_json(const fs::path &file) {
+  std::ifstream in(file);
+  return nlohmann::json::parse(in);
+}
+
+std::vector<double> constant_force(const Interface<2> &surface, const SolidSolver<2> &solver,
+                                   std::span<const double>) {
+  return surface.gather(dead_load(solver));
+}
+
+// The force does not depend on the motion, so the coupled run is the uncoupled one.
+TEST(Coupling, under_a_given_force_the_coupled_run_is_the_uncoupled_one) {
+  const Outcome outcome = couple("constant", constant_force);
+  ASSERT_EQ(outcome.solid_error, "");
+  ASSERT_EQ(outcome.fluid_error, "");
+  SolidSolver<2> solver(gate_params());
+  SolidState state = solver.initial_state(), start;
+  for (int k = 0; k < 20; ++k) {
+    start = state;
+    state = solver.step(start, dead_load(solver), 2e-4);
+  }
+  const auto tips = read_csv(outcome.folder / "tip.csv");
+  ASSERT_EQ(tips.size(), 21u) << "the state at rest and one row per window, not per iteration";
+  EXPECT_NEAR(tips.back()[0], 4e-3, 1e-15);
+  // Equal but for Newton's tolerance (the force goes through the bridge's map and back).
+  EXPECT_NEAR(tips.back()[1] / tip(solver, state, 0), 1, 1e-8);
+  const auto sums =
+      sum_loads(solver.discretisation(), dead_load(solver), start.displacement, state.displacement);
+  const auto loads = read_csv(outcome.folder / "solid_loads.csv").back();
+  EXPECT_EQ(loads[0], 20);
+  EXPECT_NEAR(loads[2], sums.force.x(), 1e-10);
+  EXPECT_NEAR(loads[4], sums.moment.z(), 1e-10);
+  EXPECT_NEAR(loads[7] / sums.work, 1, 1e-7);
+  const auto energy = read_csv(outcome.folder / "solid_energy.csv").back();
+  EXPECT_NEAR(energy[1] / solver.kinetic_energy(state), 1, 1e-7);
+  EXPECT_NEAR(energy[2] / solver.strain_energy(state), 1, 1e-7);
+  EXPECT_NEAR(energy[3] / state.load_work, 1, 1e-7);
+}
+
+TEST(Coupling, a_run_leaves_fields_and_a_summary) {
+  const Outcome outcome = couple("summary", constant_force);
+  const auto summary = read_json(outcome.folder / "solid_summary.json");
+  EXPECT_TRUE(summary.at("completed").get<bool>());
+  EXPECT_EQ(summary.at("windows").get<int>(), 20);
+  EXPECT_EQ(summary.at("solid_unknowns").get<int>(), 112);
+  EXPECT_GT(summary.at("ms_per_step_solid").get<double>(), 0);
+  std::ifstream pvd(outcome.folder / "solid.pvd");
+  std::stringstream text;
+  text << pvd.rdbuf();
+  EXPECT_TRUE(fs::exists(outcome.folder / "solid_0004.vtu")) << "0, 1, 2, 3 and 4 ms";
+  EXPECT_FALSE(fs::exists(outcome.folder / "solid_0005.vtu"));
+  EXPECT_NE(text.str().find("solid_0004.vtu"), std::string::npos);
+}
+
+// A force against the motion, as added mass and damping make it: iterations are rejected, and the
+// accepted motion is that of the converged force.
+TEST(Coupling, rejected_iterations_leave_no_trace) {
+  const double damping = 40; // [N s/m per node]
+  const auto damped = [&](const Interface<2> &surface, const SolidSolver<2> &solver,
+                          std::span<const double> velocity) {
+    auto force = surface.gather(dead_load(solver));
+    for (std::size_t k = 0; k < force.size(); ++k)
+      force[k] -= damping * velocity[k];
+    return force;
+  };
+  const Outcome outcome = couple("damped", damped);
+  ASSERT_EQ(outcome.solid_error, "");
+  ASSERT_EQ(outcome.fluid_error, "");
+  EXPECT_GT(
+      read_json(outcome.folder / "solid_summary.json").at("coupling_iterations_mean").get<double>(),
+      1.5);
+  // The same by hand: repeat each step until force and velocity agree.
+  SolidSolver<2> solver(gate_params());
+  const auto surface = wetted_interface(solver.discretisation(), Side::upper);
+  SolidState state = solver.initial_state();
+  for (int k = 0; k < 20; ++k) {
+    const SolidState start = state;
+    Eigen::VectorXd load = dead_load(solver);
+    for (int i = 0; i < 200; ++i) {
+      state = solver.step(start, load, 2e-4);
+      const Eigen::VectorXd next = surface.scatter(
+          damped(surface, solver, surface.gather(state.velocity)), static_cast<int>(load.size()));
+      load += 0.1 * (next - load);
+    }
+  }
+  const auto tips = read_csv(outcome.folder / "tip.csv");
+  EXPECT_NEAR(tips.back()[1] / tip(solver, state, 0), 1, 2e-3); // the coupling tolerance
+}
+
+TEST(Coupling, a_solid_that_fails_tells_its_partner_and_leaves_a_summary) {
+  int calls = 0;
+  const auto bursting = [&](const Interface<2> &surface, const SolidSolver<2> &solver,
+                            std::span<const double> velocity) {
+    auto force = constant_force(surface, solver, velocity);
+    if (++calls > 10)
+      for (double &f : force)
+        f *= 1e12;
+    return force;
+  };
+  const Outcome outcome = couple("bursting", bursting);
+  EXPECT_NE(outcome.solid_error.find("no solution"), std::string::npos) << outcome.solid_error;
+  EXPECT_NE(outcome.fluid_error.find("no solution"), std::string::npos) << outcome.fluid_error;
+  const auto summary = read_json(outcome.folder / "solid_summary.json");
+  EXPECT_FALSE(summary.at("completed").get<bool>());
+  EXPECT_NE(summary.at("message").get<std::string>().find("largest nodal force"),
+            std::string::npos);
+  EXPECT_GE(read_csv(outcome.folder / "tip.csv").size(), 2u) << "what was computed is there";
+}
+
+} // namespace
+} // namespace sluice::solid
