@@ -2,17 +2,13 @@
 #include "fluid/aggregates.hpp"
 
 #include <bit>
+#include <cmath>
 
 namespace sluice::fluid {
 namespace {
 
-std::uint32_t hash(const Cell &cell) {
-  const auto x = static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell[0]));
-  const auto y = static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell[1]));
-  const auto z = static_cast<std::uint64_t>(static_cast<std::uint32_t>(cell[2]));
-  const std::uint64_t mixed =
-      (x * 0x9E3779B97F4A7C15u) ^ (y * 0xC2B2AE3D27D4EB4Fu) ^ (z * 0x165667B19E3779F9u);
-  return static_cast<std::uint32_t>(mixed >> 32) ^ static_cast<std::uint32_t>(mixed);
+std::size_t hash(CellKey key) {
+  return static_cast<std::size_t>((static_cast<std::uint64_t>(key) * 0x9E3779B97F4A7C15u) >> 32);
 }
 
 } // namespace
@@ -20,54 +16,75 @@ std::uint32_t hash(const Cell &cell) {
 void AggregateFinder::find(const UnitDiagonalView &matrix, const std::vector<Cell> &cells,
                            Aggregates &result) {
   const int n = matrix.rows();
-  number_cells(matrix, cells);
-  list_members(n);
+  number_cells(matrix, cells, result);
+  list_members(cell_of_, result);
+  result.of_row.resize(n);
   root_.resize(n);
-  for_each_index(n, [&](int i) { root_[i] = i; });
-  for_each_index(static_cast<int>(cell_.size()), [&](int cell) { connect(matrix, cell); });
-  number_aggregates(result);
+  for_each_index(n, [&](int i) {
+    root_[i] = i;
+    result.of_row[i] = cell_of_[i];
+  });
+  for_each_index(result.count(), [&](int c) { keep_largest_part(matrix, c, result); });
+  attach_rest(matrix, result);
+  result.key_of_row.resize(n);
+  for_each_index(n, [&](int i) {
+    result.key_of_row[i] = result.of_row[i] < 0 ? no_cell : key_[result.of_row[i]];
+  });
 }
 
-// Neighbouring rows are mostly in one cell, which saves most look-ups.
-void AggregateFinder::number_cells(const UnitDiagonalView &matrix, const std::vector<Cell> &cells) {
+int AggregateFinder::aggregate_in(CellKey key) const {
+  const std::size_t mask = table_.size() - 1;
+  std::size_t slot = hash(key) & mask;
+  while (table_[slot] >= 0 && key_[table_[slot]] != key)
+    slot = (slot + 1) & mask;
+  return table_[slot];
+}
+
+// Consecutive rows are mostly in one cell, which saves look-ups.
+void AggregateFinder::number_cells(const UnitDiagonalView &matrix, const std::vector<Cell> &cells,
+                                   Aggregates &result) {
   const int n = matrix.rows();
   table_.assign(std::bit_ceil(static_cast<std::size_t>(n) + 1), -1);
-  cell_.clear();
+  key_.clear();
+  result.cell.clear();
   cell_of_.resize(n);
   for_each_index(n, [&](int i) { cell_of_[i] = matrix.is_isolated(i) ? -1 : 0; });
   for (int i = 0, last = -1; i < n; ++i) {
     if (cell_of_[i] < 0)
       continue;
-    if (last < 0 || cells[i] != cell_[last])
-      last = number_of(cells[i]);
+    if (last < 0 || cells[i] != result.cell[last])
+      last = number_of(cells[i], result);
     cell_of_[i] = last;
   }
 }
 
-int AggregateFinder::number_of(const Cell &cell) {
+int AggregateFinder::number_of(const Cell &cell, Aggregates &result) {
+  const CellKey key = key_of(cell);
   const std::size_t mask = table_.size() - 1;
-  std::size_t slot = hash(cell) & mask;
-  while (table_[slot] >= 0 && cell_[table_[slot]] != cell)
+  std::size_t slot = hash(key) & mask;
+  while (table_[slot] >= 0 && key_[table_[slot]] != key)
     slot = (slot + 1) & mask;
   if (table_[slot] < 0) {
-    table_[slot] = static_cast<int>(cell_.size());
-    cell_.push_back(cell);
+    table_[slot] = result.count();
+    key_.push_back(key);
+    result.cell.push_back(cell);
   }
   return table_[slot];
 }
 
-// Counting sort; start_ is used as the cursor and shifted back by it.
-void AggregateFinder::list_members(int rows) {
-  start_.assign(cell_.size() + 2, 0);
-  for (int i = 0; i < rows; ++i)
-    ++start_[cell_of_[i] + 2];
-  start_[1] = 0; // rows in no cell
-  for (std::size_t c = 2; c < start_.size(); ++c)
-    start_[c] += start_[c - 1];
-  member_.resize(start_.back());
-  for (int i = 0; i < rows; ++i)
-    if (cell_of_[i] >= 0)
-      member_[start_[cell_of_[i] + 1]++] = i;
+// Counting sort. member_start holds ends first, then walks down to the beginnings.
+void AggregateFinder::list_members(const std::vector<int> &of_row, Aggregates &result) {
+  auto &start = result.member_start;
+  start.assign(result.count() + 1, 0);
+  for (const int a : of_row)
+    if (a >= 0)
+      ++start[a];
+  for (int a = 0, total = 0; a <= result.count(); ++a)
+    start[a] = total += start[a];
+  result.member.resize(start.back());
+  for (int i = static_cast<int>(of_row.size()) - 1; i >= 0; --i)
+    if (of_row[i] >= 0)
+      result.member[--start[of_row[i]]] = i;
 }
 
 int AggregateFinder::root(int i) {
@@ -76,34 +93,68 @@ int AggregateFinder::root(int i) {
   return i;
 }
 
-// The smaller row becomes the root, so the result does not depend on the order of the entries.
-void AggregateFinder::connect(const UnitDiagonalView &matrix, int cell) {
-  for (int m = start_[cell]; m < start_[cell + 1]; ++m) {
-    const int i = member_[m];
-    matrix.for_each_entry(i, [&](int j, float) {
-      if (cell_of_[j] != cell)
-        return;
+// Unites rows of the cell that are connected; true if that leaves one set.
+bool AggregateFinder::connect(const UnitDiagonalView &matrix, int cell,
+                              const Aggregates &aggregates) {
+  const int begin = aggregates.member_start[cell], end = aggregates.member_start[cell + 1];
+  int parts = end - begin;
+  for (int m = begin; m < end && parts > 1; ++m) {
+    const int i = aggregates.member[m];
+    for (int k = 0; k < matrix.pattern.width(i) && parts > 1; ++k) {
+      const std::size_t at = matrix.pattern.place(i, k);
+      const int j = matrix.pattern.column[at];
+      if (cell_of_[j] != cell || matrix.off_diagonal[at] == 0)
+        continue;
       const int a = root(i), b = root(j);
       root_[std::max(a, b)] = std::min(a, b);
-    });
-  }
-}
-
-// Members ascend, so a root comes before the rows that point to it.
-void AggregateFinder::number_aggregates(Aggregates &result) {
-  result.of_row.resize(cell_of_.size());
-  result.cell.clear();
-  for (std::size_t i = 0; i < cell_of_.size(); ++i) {
-    const int first = root(static_cast<int>(i));
-    if (cell_of_[i] < 0)
-      result.of_row[i] = -1;
-    else if (first != static_cast<int>(i))
-      result.of_row[i] = result.of_row[first];
-    else {
-      result.of_row[i] = result.count();
-      result.cell.push_back(cell_[cell_of_[i]]);
+      parts -= a != b;
     }
   }
+  return parts == 1;
+}
+
+void AggregateFinder::keep_largest_part(const UnitDiagonalView &matrix, int cell,
+                                        Aggregates &result) {
+  if (connect(matrix, cell, result))
+    return;
+  const int begin = result.member_start[cell], end = result.member_start[cell + 1];
+  int largest = -1, most = 0;
+  for (int m = begin; m < end; ++m) {
+    int size = 0;
+    for (int other = begin; other < end; ++other)
+      size += root(result.member[other]) == root(result.member[m]);
+    if (size > most) {
+      most = size;
+      largest = root(result.member[m]);
+    }
+  }
+  for (int m = begin; m < end; ++m)
+    if (root(result.member[m]) != largest)
+      result.of_row[result.member[m]] = -1;
+}
+
+// Each piece of the rest goes where its strongest entry into a kept part points.
+void AggregateFinder::attach_rest(const UnitDiagonalView &matrix, Aggregates &result) {
+  const int n = matrix.rows();
+  rest_.clear();
+  for (int i = 0; i < n; ++i)
+    if (cell_of_[i] >= 0 && result.of_row[i] < 0)
+      rest_.push_back(i);
+  if (rest_.empty())
+    return;
+  link_.assign(n, -1);
+  strength_.assign(n, 0);
+  for (const int i : rest_)
+    matrix.for_each_entry(i, [&](int j, float value) {
+      const int piece = root(i);
+      if (result.of_row[j] < 0 || std::abs(value) <= strength_[piece])
+        return;
+      strength_[piece] = std::abs(value);
+      link_[piece] = result.of_row[j];
+    });
+  for (const int i : rest_)
+    result.of_row[i] = link_[root(i)];
+  list_members(result.of_row, result);
 }
 
 } // namespace sluice::fluid

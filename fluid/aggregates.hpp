@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Aggregates of rows for the multigrid: cells of a background grid, which the neighbour search has
-// at hand, instead of neighbourhoods in the matrix graph.
+// at hand, instead of neighbourhoods in the matrix graph. Each cell holds at most one aggregate, so
+// that a window of cells around it addresses everything it couples to.
 #pragma once
 
 #include "fluid/sparse_matrix.hpp"
@@ -12,6 +13,18 @@ namespace sluice::fluid {
 
 /// Integer coordinates of a grid cell; directions that are not used are zero.
 using Cell = std::array<std::int32_t, 3>;
+
+/// Cell coordinates packed into one number, 21 bits each: differences of keys are keys of
+/// differences. Cells beyond a million from the origin are taken for that far.
+using CellKey = std::int64_t;
+inline constexpr CellKey no_cell = std::int64_t{1} << 62;
+
+inline CellKey key_of(const Cell &cell) {
+  CellKey key = 0;
+  for (int d = 2; d >= 0; --d)
+    key = (key << 21) + std::clamp(cell[d], -1'000'000, 1'000'000);
+  return key;
+}
 
 /// A matrix I + O with O in slices and in single precision; a view.
 struct UnitDiagonalView {
@@ -28,40 +41,50 @@ struct UnitDiagonalView {
         body(pattern.column[at], off_diagonal[at]);
   }
   bool is_isolated(int i) const {
-    bool isolated = true;
-    for_each_entry(i, [&](int, float) { isolated = false; });
-    return isolated;
+    for (int k = 0; k < pattern.width(i); ++k)
+      if (off_diagonal[pattern.place(i, k)] != 0)
+        return false;
+    return true;
   }
 };
 
-/// Disjoint sets of rows. A row without off-diagonal entries is in none (aggregate -1): dividing by
-/// its diagonal solves it, so a coarser level has nothing to add.
+/// Disjoint sets of rows, one per occupied cell. Rows in none (-1) are those without off-diagonal
+/// entries, which dividing by the diagonal solves, and detached pieces in the cell of a larger one.
 struct Aggregates {
-  std::vector<int> of_row; ///< [rows] aggregate or -1
-  std::vector<Cell> cell;  ///< [aggregates] the cell that each came from
+  std::vector<int> of_row;               ///< [rows] aggregate or -1
+  std::vector<CellKey> key_of_row;       ///< [rows] cell of the aggregate or no_cell
+  std::vector<Cell> cell;                ///< [aggregates]
+  std::vector<int> member_start, member; ///< rows of each aggregate, ascending
 
   int count() const { return static_cast<int>(cell.size()); }
 };
 
-/// Finds aggregates: the rows of one cell that are connected by entries within that cell, so that a
-/// cell cut by a thin wall gives two. Keeps its memory between calls.
+/// Finds aggregates: the largest connected set of rows of each cell. Where a thin wall cuts a cell,
+/// the smaller part joins the aggregate of the next cell that it is most strongly connected to.
+/// Keeps its memory between calls.
 class AggregateFinder {
 public:
   void find(const UnitDiagonalView &matrix, const std::vector<Cell> &cells, Aggregates &result);
+  /// The aggregate in the cell, or -1.
+  int aggregate_in(CellKey key) const;
 
 private:
-  void number_cells(const UnitDiagonalView &matrix, const std::vector<Cell> &cells);
-  int number_of(const Cell &cell);
-  void list_members(int rows);
-  void connect(const UnitDiagonalView &matrix, int cell);
+  void number_cells(const UnitDiagonalView &matrix, const std::vector<Cell> &cells,
+                    Aggregates &result);
+  int number_of(const Cell &cell, Aggregates &result);
+  static void list_members(const std::vector<int> &of_row, Aggregates &result);
+  void keep_largest_part(const UnitDiagonalView &matrix, int cell, Aggregates &result);
+  bool connect(const UnitDiagonalView &matrix, int cell, const Aggregates &aggregates);
   int root(int i);
-  void number_aggregates(Aggregates &result);
+  void attach_rest(const UnitDiagonalView &matrix, Aggregates &result);
 
-  std::vector<int> table_;          // open addressing: cell number or -1; length a power of two
-  std::vector<Cell> cell_;          // [cells] in order of first appearance
-  std::vector<int> cell_of_;        // [rows] cell number or -1
-  std::vector<int> start_, member_; // rows of each cell
-  std::vector<int> root_;           // [rows] a row connected to this one; the first row to itself
+  std::vector<int> table_;   // open addressing: cell number or -1; length a power of two
+  std::vector<CellKey> key_; // [cells]
+  std::vector<int> cell_of_; // [rows] cell number or -1
+  std::vector<int> root_;    // [rows] a connected row of the same cell; the first row to itself
+  std::vector<int> rest_;    // rows that are not in their cell's largest part
+  std::vector<int> link_;    // [rows] for roots of the rest: where their piece is attached
+  std::vector<float> strength_;
 };
 
 } // namespace sluice::fluid

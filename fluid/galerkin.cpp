@@ -1,122 +1,341 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/galerkin.hpp"
 
+#include "fluid/gather.hpp"
+
 #include <cmath>
 
 namespace sluice::fluid {
-
-// An entry of slot_ is believed only if the place it names holds this column and is of this row.
-void RowCollector::Row::add(int column, float value) {
-  const auto at = static_cast<std::size_t>((*slot_)[column]);
-  if (at >= begin_ && at < column_.size() && column_[at] == column) {
-    value_[at] += value;
-    return;
-  }
-  (*slot_)[column] = static_cast<int>(column_.size());
-  column_.push_back(column);
-  value_.push_back(value);
-}
-
-void RowCollector::Row::truncate(int length) {
-  column_.resize(begin_ + length);
-  value_.resize(begin_ + length);
-}
-
-void RowCollector::prepare(int rows, int columns) {
-  slot_.resize(std::max<std::size_t>(slot_.size(), number_of_threads()));
-  for (auto &slot : slot_)
-    slot.resize(std::max<std::size_t>(slot.size(), columns));
-  for (int b = 0; b < Blocks(rows).count(); ++b) {
-    block_[b].column_.clear();
-    block_[b].value_.clear();
-    block_[b].length_.clear();
-  }
-}
-
-void RowCollector::join(int rows, CompressedRows &result) {
-  result.row_start.resize(rows + 1);
-  result.row_start[0] = 0;
-  const Blocks blocks(rows);
-  for (int b = 0; b < blocks.count(); ++b)
-    for (int i = blocks[b].begin; i < blocks[b].end; ++i)
-      result.row_start[i + 1] = result.row_start[i] + block_[b].length_[i - blocks[b].begin];
-  result.column.resize(result.row_start.back());
-  result.value.resize(result.row_start.back());
-  for_each_block(rows, [&](IndexRange range, int b) {
-    const int at = result.row_start[range.begin];
-    std::copy(block_[b].column_.begin(), block_[b].column_.end(), result.column.begin() + at);
-    std::copy(block_[b].value_.begin(), block_[b].value_.end(), result.value.begin() + at);
-  });
-}
-
-void build_prolongation(const UnitDiagonalView &matrix, const Aggregates &aggregates, float weight,
-                        RowCollector &collector, CompressedRows &result) {
-  const auto &of_row = aggregates.of_row;
-  collector.collect(matrix.rows(), aggregates.count(), result, [&](int i, RowCollector::Row &row) {
-    if (of_row[i] < 0)
-      return;
-    row.add(of_row[i], 1 - weight);
-    matrix.for_each_entry(i, [&](int j, float value) {
-      if (of_row[j] >= 0)
-        row.add(of_row[j], -weight * value);
-    });
-  });
-}
-
-void transpose(const CompressedRows &rows, int columns, CompressedRows &result) {
-  auto &start = result.row_start;
-  start.assign(columns + 2, 0);
-  for (const int c : rows.column)
-    ++start[c + 2];
-  for (int c = 2; c < columns + 2; ++c)
-    start[c] += start[c - 1];
-  result.column.resize(rows.column.size());
-  result.value.resize(rows.column.size());
-  for (int i = 0; i < rows.rows(); ++i)
-    for (int k = rows.row_start[i]; k < rows.row_start[i + 1]; ++k) {
-      const int at = start[rows.column[k] + 1]++;
-      result.column[at] = i;
-      result.value[at] = rows.value[k];
-    }
-  start.pop_back();
-}
-
 namespace {
 
-void add_scaled(RowCollector::Row &row, float factor, const CompressedRows &rows, int i) {
-  for (int k = rows.row_start[i]; k < rows.row_start[i + 1]; ++k)
-    row.add(rows.column[k], factor * rows.value[k]);
+// Below this part of what it is summed from, a diagonal is rounding error.
+constexpr float vanishing = 1e-5f;
+
+constexpr int power(int base, int exponent) {
+  return exponent == 0 ? 1 : base * power(base, exponent - 1);
 }
 
-void drop_small(RowCollector::Row &row, float drop) {
-  const float threshold = drop * std::abs(row.value(0));
-  int kept = 1;
-  for (int k = 1; k < row.length(); ++k)
-    if (std::abs(row.value(k)) < threshold)
-      row.value(0) += row.value(k);
-    else {
-      row.column(kept) = row.column(k);
-      row.value(kept++) = row.value(k);
+// Each aggregate first collects the values in its window; a row then adds what it weighs of them.
+template <int width>
+void prolong_windows(const Transfer &t, const std::vector<float> &coarse, std::vector<float> &x) {
+  for_each_index(t.aggregates(), [&](int a) {
+    std::array<Lanes<float>, width / 16> around;
+    for (int part = 0; part < width / 16; ++part)
+      around[part] = gathered(&t.neighbour[a * width + 16 * part], coarse.data());
+    for (int m = t.member_start[a]; m < t.member_start[a + 1]; ++m) {
+      const float *weight = &t.weight[static_cast<std::size_t>(m) * width];
+      Lanes<float> total{};
+      for (int l = 0; l < width; ++l)
+        total[l % 16] += weight[l] * around[l / 16][l % 16];
+      x[t.member[m]] += sum_of(total);
     }
-  row.truncate(kept);
+  });
+}
+
+// The reverse: each aggregate adds up the windows of its rows, then every aggregate takes its share
+// from those around it.
+template <int width>
+void restrict_windows(Transfer &t, const std::vector<float> &r, const std::vector<float> &scale,
+                      std::vector<float> &coarse) {
+  for_each_index(t.aggregates(), [&](int a) {
+    std::array<float, width> total{};
+    for (int m = t.member_start[a]; m < t.member_start[a + 1]; ++m) {
+      const float *weight = &t.weight[static_cast<std::size_t>(m) * width];
+      const float residual = r[t.member[m]];
+      for (int l = 0; l < width; ++l)
+        total[l] += weight[l] * residual;
+    }
+    std::copy(total.begin(), total.end(), &t.partial[static_cast<std::size_t>(a) * width]);
+  });
+  for_each_index(t.aggregates(), [&](int a) {
+    float total = 0;
+    for (int part = 0; part < width / 16; ++part)
+      total += sum_of(gathered(&t.source[a * width + 16 * part], t.partial.data()));
+    coarse[a] = total * scale[a];
+  });
 }
 
 } // namespace
 
-void GalerkinProduct::build(const UnitDiagonalView &matrix, const CompressedRows &prolongation,
-                            const CompressedRows &restriction, float drop, RowCollector &collector,
-                            CompressedRows &coarse) {
-  const int n = matrix.rows(), n_coarse = restriction.rows();
-  collector.collect(n, n_coarse, a_p_, [&](int i, RowCollector::Row &row) {
-    add_scaled(row, 1, prolongation, i);
-    matrix.for_each_entry(i, [&](int j, float v) { add_scaled(row, v, prolongation, j); });
-  });
-  collector.collect(n_coarse, n_coarse, coarse, [&](int c, RowCollector::Row &row) {
-    row.add(c, 0);
-    for (int k = restriction.row_start[c]; k < restriction.row_start[c + 1]; ++k)
-      add_scaled(row, restriction.value[k], a_p_, restriction.column[k]);
-    drop_small(row, drop);
-  });
+void Transfer::prolong(const std::vector<float> &coarse, std::vector<float> &x) const {
+  if (width == 16)
+    prolong_windows<16>(*this, coarse, x);
+  else
+    prolong_windows<32>(*this, coarse, x);
+}
+
+void Transfer::restrict(const std::vector<float> &r, const std::vector<float> &scale,
+                        std::vector<float> &coarse) {
+  if (width == 16)
+    restrict_windows<16>(*this, r, scale, coarse);
+  else
+    restrict_windows<32>(*this, r, scale, coarse);
+}
+
+// Cells around a given one are numbered by `shift`, 0 .. 3^dim - 1, the first direction fastest.
+// Rows of P and of A P are both laid out with 5 cells per direction, so that moving the first into
+// the second is adding an offset; the zeros behind each row of P are also those in front of the
+// next, so that a row can be read moved.
+template <int dim> class GalerkinProduct::Windows {
+public:
+  static constexpr int shifts = power(3, dim);
+  static constexpr int a_p_size = dim == 2 ? 32 : 128; // 25 or 125 places used
+  static constexpr int p_size = a_p_size;              // 13 or 63 places used
+  static constexpr int coarse_size = power(7, dim);
+  static constexpr int width = dim == 2 ? 16 : 32; // of the windows kept for the transfers
+  static constexpr int centre = shifts / 2, coarse_centre = coarse_size / 2;
+  // In place of a shift: a column in no aggregate, and one of an aggregate that is not next to the
+  // row's, for which the row's own is taken.
+  static constexpr std::int8_t nowhere = -1, elsewhere = centre;
+
+  Windows(GalerkinProduct &memory, const UnitDiagonalView &matrix, const Aggregates &aggregates,
+          const AggregateFinder &finder, const CoarseningParams &params, CoarseLevel &result)
+      : m_(memory), matrix_(matrix), aggregates_(aggregates), finder_(finder), params_(params),
+        result_(result), transfer_(result.transfer) {}
+
+  void build() {
+    find_neighbours();
+    find_shifts();
+    compute_p();
+    compute_a_p();
+    compute_coarse();
+    slice_coarse();
+  }
+
+private:
+  using CoarseWindow = std::array<float, coarse_size>;
+
+  static constexpr int coordinate(int shift, int d) { return shift / power(3, d) % 3; }
+  // Place of the cell `shift` in a window with `width` cells per direction.
+  static constexpr int offset(int shift, int width) {
+    int at = 0;
+    for (int d = dim - 1; d >= 0; --d)
+      at = at * width + coordinate(shift, d);
+    return at;
+  }
+  static constexpr std::array<int, shifts> offsets(int width) {
+    std::array<int, shifts> at{};
+    for (int s = 0; s < shifts; ++s)
+      at[s] = offset(s, width);
+    return at;
+  }
+  static constexpr auto in_five = offsets(5), in_seven = offsets(7);
+
+  static std::int8_t shift_between(CellKey from, CellKey to) {
+    constexpr CellKey mask = (1 << 21) - 1, one = 1;
+    const CellKey e = to - from + one + (one << 21) + (dim == 3 ? one << 42 : 0);
+    const CellKey x = e & mask, y = (e >> 21) & mask, z = e >> 42;
+    const bool is_next = x <= 2 && y <= 2 && z >= 0 && z <= (dim == 3 ? 2 : 0);
+    const auto shift = static_cast<std::int8_t>(x + 3 * y + 9 * z);
+    return to == no_cell ? nowhere : is_next ? shift : elsewhere;
+  }
+  static CellKey key_of_shift(int place, int width) {
+    Cell cell{};
+    for (int d = 0; d < dim; ++d, place /= width)
+      cell[d] = place % width - width / 2;
+    return key_of(cell);
+  }
+
+  float *p(int i) { return &m_.p_[(static_cast<std::size_t>(i) + 1) * p_size]; }
+  float *a_p(int i) { return &m_.a_p_[static_cast<std::size_t>(i) * a_p_size]; }
+  float *weight(int m) { return &transfer_.weight[static_cast<std::size_t>(m) * width]; }
+  int neighbour(int a, int shift) const { return transfer_.neighbour[a * width + shift]; }
+
+  void find_neighbours() {
+    transfer_.width = width;
+    transfer_.member_start.assign(aggregates_.member_start.begin(), aggregates_.member_start.end());
+    transfer_.member.assign(aggregates_.member.begin(), aggregates_.member.end());
+    transfer_.partial.resize(static_cast<std::size_t>(aggregates_.count()) * width);
+    transfer_.source.resize(static_cast<std::size_t>(aggregates_.count()) * width);
+    transfer_.neighbour.resize(static_cast<std::size_t>(aggregates_.count()) * width);
+    for_each_index(aggregates_.count(), [&](int a) {
+      const CellKey key = key_of(aggregates_.cell[a]);
+      for (int s = 0; s < width; ++s) {
+        const int next = s < shifts ? finder_.aggregate_in(key + key_of_shift(s, 3)) : -1;
+        transfer_.neighbour[a * width + s] = next;
+        transfer_.source[a * width + s] = next < 0 ? -1 : next * width + shifts - 1 - s;
+      }
+    });
+  }
+
+  void find_shifts() {
+    const SlicedPattern &pattern = matrix_.pattern;
+    m_.shift_.resize(pattern.stored());
+    for_each_index(pattern.slices(), [&](int s) {
+      constexpr int lanes = SlicedPattern::lanes;
+      std::array<CellKey, lanes> from;
+      for (int lane = 0; lane < lanes; ++lane)
+        from[lane] = aggregates_.key_of_row[std::min(s * lanes + lane, matrix_.rows() - 1)];
+      const std::size_t begin = pattern.place(s * lanes, 0);
+      const std::size_t end = begin + static_cast<std::size_t>(pattern.width(s * lanes)) * lanes;
+      for (std::size_t at = begin; at < end; at += lanes)
+        for (int lane = 0; lane < lanes; ++lane)
+          m_.shift_[at + lane] =
+              shift_between(from[lane], aggregates_.key_of_row[pattern.column[at + lane]]);
+    });
+  }
+
+  // body(column, shift, value) for the entries of a row that lead to an aggregate.
+  template <class Body> void for_each_shifted(int i, Body &&body) const {
+    const SlicedPattern &pattern = matrix_.pattern;
+    const std::size_t first = pattern.place(i, 0);
+    const std::size_t last = first + static_cast<std::size_t>(pattern.width(i)) * pattern.lanes;
+    for (std::size_t at = first; at < last; at += pattern.lanes)
+      if (m_.shift_[at] != nowhere)
+        body(pattern.column[at], m_.shift_[at], matrix_.off_diagonal[at]);
+  }
+
+  void compute_p() {
+    transfer_.weight.resize(aggregates_.member.size() * width);
+    m_.p_.resize((static_cast<std::size_t>(matrix_.rows()) + 1) * p_size);
+    std::fill_n(m_.p_.begin(), p_size, 0.0f);
+    for_each_index(matrix_.rows(), [&](int i) {
+      if (aggregates_.of_row[i] < 0)
+        std::fill_n(p(i), p_size, 0.0f);
+    });
+    for_each_index(static_cast<int>(aggregates_.member.size()), [&](int m) { compute_p(m); });
+  }
+
+  void compute_p(int m) {
+    const int i = aggregates_.member[m];
+    std::array<float, width> window{};
+    window[centre] = 1 - params_.prolongation_weight;
+    for_each_shifted(i, [&](int, int shift, float value) {
+      window[shift] -= params_.prolongation_weight * value;
+    });
+    std::copy(window.begin(), window.end(), weight(m));
+    std::array<float, p_size> spread{};
+    for (int s = 0; s < shifts; ++s)
+      spread[in_five[s]] = window[s];
+    std::copy(spread.begin(), spread.end(), p(i));
+  }
+
+  void compute_a_p() {
+    m_.a_p_.resize(static_cast<std::size_t>(matrix_.rows()) * a_p_size);
+    for_each_index(matrix_.rows(), [&](int i) {
+      if (aggregates_.of_row[i] >= 0)
+        compute_a_p(i);
+    });
+  }
+
+  void compute_a_p(int i) {
+    std::array<float, a_p_size> total;
+    const float *own = p(i) - in_five[centre];
+    for (int l = 0; l < a_p_size; ++l)
+      total[l] = own[l];
+    for_each_shifted(i, [&](int j, int shift, float value) {
+      const float *row = p(j) - in_five[shift];
+      for (int l = 0; l < a_p_size; ++l)
+        total[l] += value * row[l];
+    });
+    std::copy(total.begin(), total.end(), a_p(i));
+  }
+
+  static void set(SlicedFloats &matrix, int i, int k, int column, float value) {
+    const std::size_t at = matrix.pattern.place(i, k);
+    matrix.pattern.column[at] = column;
+    matrix.value[at] = value;
+  }
+
+  void compute_coarse() {
+    const int n = aggregates_.count();
+    result_.scale.resize(n);
+    m_.row_start_.resize(n);
+    for_each_block(n, [&](IndexRange range, int b) {
+      Block &block = m_.block_[b];
+      block.column.clear();
+      block.value.clear();
+      block.length.clear();
+      for (int a = range.begin; a < range.end; ++a)
+        compute_coarse_row(a, block);
+    });
+  }
+
+  void compute_coarse_row(int a, Block &block) {
+    CoarseWindow window{};
+    float size = 0;
+    for (int s = 0; s < shifts; ++s)
+      if (neighbour(a, s) >= 0)
+        add_members(neighbour(a, s), s, window, size);
+    m_.row_start_[a] = static_cast<int>(block.column.size());
+    float diagonal = window[coarse_centre];
+    const float threshold = params_.drop_tolerance * std::abs(diagonal);
+    const CellKey key = key_of(aggregates_.cell[a]);
+    for (int w = 0; w < coarse_size; ++w) {
+      if (w == coarse_centre || window[w] == 0)
+        continue;
+      const int c =
+          std::abs(window[w]) < threshold ? -1 : finder_.aggregate_in(key + key_of_shift(w, 7));
+      if (c < 0) {
+        diagonal += window[w];
+        continue;
+      }
+      block.column.push_back(c);
+      block.value.push_back(window[w]);
+    }
+    block.length.push_back(static_cast<int>(block.column.size()) - m_.row_start_[a]);
+    result_.scale[a] = diagonal > vanishing * size ? 1 / diagonal : 0;
+  }
+
+  // Adds the rows of A P in the cell `shift` of an aggregate, each times its entry of R.
+  void add_members(int from, int shift, CoarseWindow &window, float &size) {
+    std::array<float, a_p_size> total{};
+    for (int m = aggregates_.member_start[from]; m < aggregates_.member_start[from + 1]; ++m) {
+      const int i = aggregates_.member[m];
+      const float r = weight(m)[shifts - 1 - shift];
+      size += std::abs(r);
+      for (int l = 0; l < a_p_size; ++l)
+        total[l] += r * a_p(i)[l];
+    }
+    constexpr int planes = dim == 3 ? 5 : 1;
+    for (int z = 0; z < planes; ++z)
+      for (int y = 0; y < 5; ++y)
+        for (int x = 0; x < 5; ++x)
+          window[in_seven[shift] + x + 7 * y + 49 * z] += total[x + 5 * y + 25 * z];
+  }
+
+  void slice_coarse() {
+    const int n = aggregates_.count();
+    auto &[pattern, value] = result_.off_diagonal;
+    const Blocks blocks(n);
+    const auto length = [&](int a) {
+      const int b = blocks.of(a);
+      return m_.block_[b].length[a - blocks[b].begin];
+    };
+    pattern.lay_out(n, length);
+    value.resize(pattern.stored());
+    result_.entries = n;
+    for (int b = 0; b < blocks.count(); ++b)
+      result_.entries += m_.block_[b].column.size();
+    for_each_index(pattern.slices() * pattern.lanes, [&](int a) {
+      const int entries = a < n ? length(a) : 0;
+      for (int k = 0; k < pattern.width(a); ++k) {
+        const Block &block = m_.block_[blocks.of(std::min(a, n - 1))];
+        if (k < entries)
+          set(result_.off_diagonal, a, k, block.column[m_.row_start_[a] + k],
+              block.value[m_.row_start_[a] + k] * result_.scale[a]);
+        else
+          set(result_.off_diagonal, a, k, std::min(a, n - 1), 0);
+      }
+    });
+  }
+
+  GalerkinProduct &m_;
+  const UnitDiagonalView &matrix_;
+  const Aggregates &aggregates_;
+  const AggregateFinder &finder_;
+  const CoarseningParams &params_;
+  CoarseLevel &result_;
+  Transfer &transfer_;
+};
+
+void GalerkinProduct::build(int dim, const UnitDiagonalView &matrix, const Aggregates &aggregates,
+                            const AggregateFinder &finder, const CoarseningParams &params,
+                            CoarseLevel &result) {
+  if (dim == 2)
+    Windows<2>(*this, matrix, aggregates, finder, params, result).build();
+  else
+    Windows<3>(*this, matrix, aggregates, finder, params, result).build();
 }
 
 } // namespace sluice::fluid

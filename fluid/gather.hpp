@@ -32,6 +32,33 @@ Lanes<Number> gathered_sums(const Value *value, const int *column, int width, co
   return total;
 }
 
+/// lane l: x[index[l]], or zero where the index is negative.
+inline Lanes<float> gathered(const int *index, const float *x) {
+  Lanes<float> lanes;
+#ifdef __AVX512F__
+  const __m512i at = _mm512_loadu_si512(index);
+  const __mmask16 is_there = _mm512_cmpge_epi32_mask(at, _mm512_setzero_si512());
+  _mm512_storeu_ps(lanes.data(), _mm512_mask_i32gather_ps(_mm512_setzero_ps(), is_there, at, x, 4));
+#else
+  for (int l = 0; l < 16; ++l)
+    lanes[l] = index[l] < 0 ? 0 : x[index[l]];
+#endif
+  return lanes;
+}
+
+/// Sum of the lanes, by halves.
+inline float sum_of(const Lanes<float> &lanes) {
+#ifdef __AVX512F__
+  return _mm512_reduce_add_ps(_mm512_loadu_ps(lanes.data()));
+#else
+  Lanes<float> v = lanes;
+  for (int half = 8; half > 0; half /= 2)
+    for (int l = 0; l < half; ++l)
+      v[l] += v[l + half];
+  return v[0];
+#endif
+}
+
 #ifdef __AVX512F__
 
 template <>

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// Multigrid preconditioner by smoothed aggregation over grid cells (see galerkin.hpp), V-cycle with
+// Multigrid preconditioner by smoothed aggregation over grid cells (see galerkin.hpp): V-cycle with
 // one damped Jacobi step before and after the coarse correction, single precision throughout.
 // Jacobi and not Gauss-Seidel: its steps are products that vectorise and do not depend on the
 // threads.
@@ -15,9 +15,9 @@ public:
   struct Params {
     double smoothing_weight = 0.85;   ///< of the Jacobi steps
     double prolongation_weight = 0.7; ///< of the Jacobi step that smooths the prolongation
-    double drop_tolerance = 0.01; ///< coarse entries below this fraction of the diagonal are lumped
-    int coarsening = 3;           ///< cells per direction that make a cell of the next level
-    int coarsest_size = 64;       ///< unknowns that are solved directly
+    double drop_tolerance = 0.01;     ///< coarse entries below this part of the diagonal are lumped
+    int coarsening = 3;               ///< cells per direction that make a cell of the next level
+    int coarsest_size = 64;           ///< unknowns that are solved directly
 
     template <class Reader> void describe(Reader &read) {
       read("smoothing_weight", smoothing_weight, "weight of the Jacobi steps");
@@ -43,47 +43,41 @@ public:
   void apply(std::span<const double> r, std::span<float> z) override;
 
   int levels() const { return n_levels_; }
-  int rows(int level) const;
-  /// Stored entries of all levels over those of the finest, padding not counted.
+  int rows(int level) const { return level_[level].rows; }
+  /// Entries of all levels over those of the finest.
   double operator_complexity() const;
+  /// Transfers from `level` and the matrix of the next, for tests.
+  const CoarseLevel &coarsening(int level) const { return level_[level].coarser; }
 
 private:
   struct Level {
-    SlicedPattern pattern;           // coarse levels only
-    std::vector<float> off_diagonal; // coarse levels only
-    std::vector<float> weight;       // [rows] Jacobi weight, 1 for isolated rows
-    std::vector<float> coarse_scale; // [coarse rows] 1 / diagonal of R A P
-    SlicedPattern prolongation;
-    std::vector<float> prolongation_value;
-    CompressedRows restriction;
-    std::vector<Cell> cell; // [rows]
-    std::vector<float> b, x, r;
     int rows = 0;
-    std::size_t entries = 0;
+    std::vector<Cell> cell;    // [rows]
+    std::vector<float> weight; // [rows] of the Jacobi step, 1 for isolated rows
+    std::vector<float> b, x, r;
+    CoarseLevel coarser;
   };
 
   UnitDiagonalView view(int level) const;
   void start_level(int level);
   void coarsen(int level);
-  void set_coarse_matrix(Level &fine, Level &coarse);
   void invert_coarsest();
+  void eliminate(int pivot, int n);
   void cycle(int level);
   void solve_coarsest();
-  void smooth_residual(int level);
-  void correct(int level);
-  template <class Store> void smooth(int level, Store &&store);
+  void restrict_residual(int level);
+  void smooth(int level);
 
   Params params_;
   const ScaledMatrix *matrix_ = nullptr;
+  int dim_ = 2;
   std::vector<Level> level_;
   int n_levels_ = 0;
   std::vector<float> inverse_; // [n, n] of the coarsest level; empty if it is not solved directly
   std::vector<double> work_;
   AggregateFinder finder_;
   Aggregates aggregates_;
-  RowCollector collector_;
   GalerkinProduct product_;
-  CompressedRows prolongation_, coarse_;
 };
 
 } // namespace sluice::fluid

@@ -17,6 +17,7 @@ void write_matrix_market(std::ostream &out, const SparseMatrix &matrix) {
 
 void ScaledMatrix::build(const SparseMatrix &a) {
   const int n = a.rows();
+  entries_ = a.column.size();
   pattern_.lay_out(n, [&](int i) { return a.row_start[i + 1] - a.row_start[i] - 1; });
   value_.resize(pattern_.stored());
   value_float_.resize(pattern_.stored());

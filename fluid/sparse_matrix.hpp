@@ -27,17 +27,6 @@ struct SparseMatrix {
 /// Writes `matrix` in MatrixMarket's coordinate format, for other solvers to read.
 void write_matrix_market(std::ostream &out, const SparseMatrix &matrix);
 
-/// Compressed rows in single precision without any rule about the diagonal: what the set-up of the
-/// multigrid computes with.
-struct CompressedRows {
-  std::vector<int> row_start{0};
-  std::vector<int> column;
-  std::vector<float> value;
-
-  int rows() const { return static_cast<int>(row_start.size()) - 1; }
-  int entries() const { return static_cast<int>(column.size()); }
-};
-
 /// The places of a matrix's entries in slices of sixteen rows: entry k of row i stands at
 /// (slice_start[i / 16] + k) * 16 + i % 16. Short rows are filled up with zeros in column
 /// min(i, columns - 1), where a product reads what it has just read.
@@ -102,6 +91,7 @@ public:
   void build(const SparseMatrix &a);
 
   int rows() const { return pattern_.rows; }
+  std::size_t entries() const { return entries_; }
   const SlicedPattern &pattern() const { return pattern_; }
   const std::vector<double> &off_diagonal() const { return value_; }
   const std::vector<float> &off_diagonal_float() const { return value_float_; }
@@ -116,6 +106,7 @@ public:
 private:
   void fill_row(const SparseMatrix &a, int i);
 
+  std::size_t entries_ = 0;
   SlicedPattern pattern_;
   std::vector<double> value_, inverse_diagonal_;
   std::vector<float> value_float_;
