@@ -12,6 +12,7 @@ import json
 import shutil
 import signal
 import subprocess
+import textwrap
 import time
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
@@ -28,6 +29,7 @@ LAUNCHER = ROOT / "build/bridge/launcher/sluice"
 EARLY_S = 0.06               # until the gap opens every run should agree
 OUTFLOW_INSTANT_S = 0.08
 SECONDS_TO_STOP = 30         # for the launcher, after the time limit
+LONGEST_CAUSE = 110          # characters in a table
 
 
 @dataclass(frozen=True)
@@ -127,7 +129,8 @@ def first_failure(summary):
     if not by_itself:
         return "" if summary.get("completed") else "ended before its end time"
     message = by_itself[0]["message"] or by_itself[0]["ended"]
-    return " ".join(message.split())
+    # A partner that was told why repeats it: the cause is the end of its sentence.
+    return " ".join(message.split("its last message: ")[-1].split())
 
 
 def tip_values(run):
@@ -214,8 +217,11 @@ def shown(value, scale=1.0, digits=1):
 
 
 def result(outcome):
-    return "ran through" if outcome.completed \
-        else f"stopped at {outcome.reached_s:.4f} s: {outcome.cause}"
+    """For the tables; the CSV has the whole cause."""
+    if outcome.completed:
+        return "ran through"
+    cause = textwrap.shorten(outcome.cause, LONGEST_CAUSE, placeholder=" ...")
+    return f"stopped at {outcome.reached_s:.4f} s: {cause}"
 
 
 COMMON_HEADER = ["iterations mean (max)", "peak x mm", "at s", "then min mm", "x at 0.06 s mm",
