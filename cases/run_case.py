@@ -97,7 +97,7 @@ def quietly(command, title, log):
     process = subprocess.Popen(command, cwd=ROOT, text=True, env=environment, errors="replace",
                                stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     lines = []
-    with log.open("a") as file:
+    with log.open("a", buffering=1) as file:
         for line in process.stdout:
             file.write(line)
             lines.append(line)
