@@ -28,9 +28,11 @@ public:
       start();
       while (iterate()) {
       }
+      if (is_singular())
+        remove_mean();
       compute_residual();
     }
-    result_.converged = result_.residual <= target_;
+    result_.converged = std::isfinite(result_.residual) && result_.residual <= target_;
     return result_;
   }
 
@@ -62,6 +64,11 @@ private:
     const double multiplier = sum(n_, [&](int i) { return r[i]; }) / column_sum_;
     for_each_index(n_, [&](int i) { r[i] -= multiplier * matrix_.inverse_diagonal(i); });
     return multiplier;
+  }
+
+  void remove_mean() {
+    const double mean = sum(n_, [&](int i) { return x_[i]; }) / n_;
+    for_each_index(n_, [&](int i) { x_[i] -= mean; });
   }
 
   // Begins anew from the residual of the present x.

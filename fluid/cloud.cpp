@@ -96,16 +96,18 @@ double enveloped_area(VoronoiCell cell, const Vec<2> &normal, PointKind kind, do
 
 void update_cell(int i, Points &points, Cloud &cloud) {
   const VoronoiCell cell = cell_of(i, points, cloud);
-  const double limit = (points.at_surface[i] ? close_ratio : open_ratio) * cloud.spacing;
+  const bool was_open = points.at_surface[i] == SurfaceMemory::open;
+  const double limit = (was_open ? close_ratio : open_ratio) * cloud.spacing;
   cloud.surface_normal[i] = Vec<2>::Zero();
   cloud.kind[i] = PointKind::interior;
-  points.at_surface[i] = cell.reach() > limit;
+  const bool is_open = cell.reach() > limit;
   const Vec<2> offset = cell.centroid();
   cloud.centroid_offset[i] = offset;
-  if (!points.at_surface[i]) {
+  if (!is_open) {
     cloud.cell_area[i] = cell.area();
     return;
   }
+  points.at_surface[i] = SurfaceMemory::open;
   const bool is_thin = offset.norm() < thin_ratio * cloud.spacing;
   cloud.kind[i] = is_thin ? PointKind::thin : PointKind::surface;
   cloud.surface_normal[i] = is_thin ? Vec<2>(Vec<2>::Zero()) : Vec<2>(offset.normalized());

@@ -14,7 +14,9 @@
 #include "bridge/base/vec.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
 
 namespace sluice::fluid {
 
@@ -59,6 +61,23 @@ public:
     if (!(det > 1e-4 * trace * trace))
       return Mat<2>::Zero();
     return moment_.inverse();
+  }
+
+  /// Inverse moment that never amplifies more than ten times beyond the best determined direction:
+  /// linear fields are exact where the neighbours spread in both directions, and the gradient
+  /// across a filament fades instead of growing.
+  Mat<2> limited_inverse() const {
+    const double trace = moment_.trace();
+    if (!(trace > 0))
+      return Mat<2>::Zero();
+    const Eigen::SelfAdjointEigenSolver<Mat<2>> eigen(moment_);
+    const double largest = eigen.eigenvalues()[1], floor = 0.1 * largest;
+    Vec<2> inverse;
+    for (int k = 0; k < 2; ++k) {
+      const double lambda = std::max(eigen.eigenvalues()[k], 0.0);
+      inverse[k] = lambda >= floor ? 1 / lambda : lambda / (floor * floor);
+    }
+    return eigen.eigenvectors() * inverse.asDiagonal() * eigen.eigenvectors().transpose();
   }
 
 private:

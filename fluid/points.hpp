@@ -9,6 +9,9 @@
 
 namespace sluice::fluid {
 
+/// What a point remembers of the last step's free surface.
+enum SurfaceMemory : std::uint8_t { enclosed = 0, open = 1, released = 2 };
+
 /// The points that carry the fluid, one entry per point in every array, sorted by grid cell.
 struct Points {
   std::vector<Vec<2>> position;          // [m]
@@ -18,7 +21,7 @@ struct Points {
   std::vector<Vec<2>> shift_velocity;    // [m/s], change of velocity along that shift
   std::vector<double> pressure;          // [Pa], mean over the last step
   std::vector<std::int32_t> id;          // stays with the point for its life
-  std::vector<std::uint8_t> at_surface;  // was at the free surface in the last step
+  std::vector<SurfaceMemory> at_surface; // in the last step
 
   int size() const { return static_cast<int>(position.size()); }
 };

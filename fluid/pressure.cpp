@@ -22,8 +22,8 @@ struct Stencil {
   double h;                        // kernel radius [m]
   std::span<const int> neighbours;
   const PointWalls *walls;         // or nullptr
-  bool open;                       // has a free side: a zero half a spacing outside
-  Vec<2> open_side;                // q of that zero
+  bool open;                       // touches air: no wall holds it, its pressure is not solved for
+  Vec<2> open_side;                // q of the zero of pressure half a spacing outside; 0: at the point
 };
 
 double reach_of_rows(const Cloud &cloud) { return wall_row_reach * cloud.spacing; }
@@ -36,21 +36,10 @@ template <class Visit> void for_each_wall_row(const Stencil &s, const Cloud &clo
       visit(m, s.walls->projection[m]);
 }
 
-// A surface point that lies on a wall with its back (a film one point deep) takes the gradient from
-// the wall's datum instead of the zero above it.
-bool lies_on_wall(const Stencil &s, const Cloud &cloud) {
-  bool lies = false;
-  for_each_wall_row(s, cloud, [&](int, const Projection &p) {
-    lies = lies || p.normal.dot(cloud.surface_normal[s.i]) < -0.5;
-  });
-  return lies;
-}
-
 Stencil stencil_of(int i, const Cloud &cloud) {
   const Vec<2> open_side = 0.5 * cloud.spacing / cloud.radius * cloud.surface_normal[i];
-  Stencil s{i, cloud.radius, cloud.neighbours.of(i), cloud.walls_of(i), false, open_side};
-  s.open = cloud.kind[i] == PointKind::surface && !lies_on_wall(s, cloud);
-  return s;
+  return {i,         cloud.radius, cloud.neighbours.of(i), cloud.walls_of(i),
+          cloud.kind[i] != PointKind::interior, open_side};
 }
 
 struct Neighbour {
@@ -81,16 +70,19 @@ QuadraticFit quadratic_fit(const Stencil &s, const Points &points, const Cloud &
   return fit;
 }
 
-/// Functionals of d/dx, d/dy from the linear fit with wall rows and the surface's zero.
+/// Functionals of d/dx, d/dy from the linear fit: with the walls' rows inside, with the zero of
+/// pressure outside at open points. Walls hold no open point: contact does.
 Eigen::Matrix<double, 5, 2> linear_gradient(const Stencil &s, const Points &points,
                                             const Cloud &cloud) {
   LinearFit fit;
   for_each_neighbour(s, points, [&](const Neighbour &n) { fit.add(n.q, n.w); });
   if (s.open)
     fit.add(s.open_side, weight(s.open_side.norm()));
-  for_each_wall_row(s, cloud, [&](int, const Projection &p) { fit.add(p.normal, wall_weight); });
+  else
+    for_each_wall_row(s, cloud,
+                      [&](int, const Projection &p) { fit.add(p.normal, wall_weight); });
   Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
-  functional.topRows<2>() = fit.inverse() / s.h;
+  functional.topRows<2>() = (s.open ? fit.limited_inverse() : fit.inverse()) / s.h;
   return functional;
 }
 
@@ -98,7 +90,7 @@ Eigen::Matrix<double, 5, 2> linear_gradient(const Stencil &s, const Points &poin
 Mat<2> fluid_gradient(const Stencil &s, const Points &points) {
   LinearFit fit;
   for_each_neighbour(s, points, [&](const Neighbour &n) { fit.add(n.q, n.w); });
-  return fit.inverse() / s.h;
+  return (s.open ? fit.limited_inverse() : fit.inverse()) / s.h;
 }
 
 // --- velocity -------------------------------------------------------------------------------
@@ -277,7 +269,8 @@ private:
     surface_row(s, points_, cloud_, off_diagonal(s));
     problem_.gradient[s.i] = linear_gradient(s, points_, cloud_);
     update_velocity_gradient(s, linear_functional(s));
-    update_wall_rows(s, {});
+    if (s.walls)
+      problem_.wall_rows[cloud_.wall_slot[s.i]] = {};
   }
 
   RowKind poisson_row(const Stencil &s) const {
@@ -351,7 +344,60 @@ private:
   PressureProblem &problem_;
 };
 
+// --- tension ----------------------------------------------------------------------------------
+
+bool is_next_to_air(int i, const Points &points, const Cloud &cloud) {
+  const double near = 1.5 * cloud.spacing;
+  for (const int j : cloud.neighbours.of(i)) {
+    const bool is_air = cloud.kind[j] != PointKind::interior ||
+                        points.at_surface[j] == SurfaceMemory::released;
+    if (is_air && (points.position[j] - points.position[i]).squaredNorm() < near * near)
+      return true;
+  }
+  return false;
+}
+
+// One Jacobi step from the last pressure: is row i pulled below zero?
+bool is_in_tension(int i, const Points &points, const PressureProblem &problem) {
+  const SparseMatrix &matrix = problem.matrix;
+  double pull = problem.source[i];
+  for (int k = matrix.row_start[i] + 1; k < matrix.row_start[i + 1]; ++k)
+    pull -= matrix.value[k] * points.pressure[matrix.column[k]];
+  return pull < 0;
+}
+
 } // namespace
+
+int release_tension(Points &points, const Walls &walls, const PressureParams &params,
+                    std::span<const Vec<2>> predicted_velocity,
+                    std::span<const double> target_divergence, double dt, Cloud &cloud,
+                    PressureProblem &problem) {
+  set_wall_velocity(walls, cloud, params, dt, problem);
+  std::vector<char> released(points.size(), 0);
+  for_each_point(points.size(), [&](int i) {
+    released[i] = cloud.kind[i] == PointKind::interior && is_next_to_air(i, points, cloud) &&
+                  is_in_tension(i, points, problem);
+  });
+  std::vector<int> changed;
+  for (int i = 0; i < points.size(); ++i) {
+    if (cloud.kind[i] != PointKind::interior)
+      continue;
+    points.at_surface[i] = released[i] ? SurfaceMemory::released : SurfaceMemory::enclosed;
+    if (released[i]) {
+      cloud.kind[i] = PointKind::thin;
+      changed.push_back(i);
+    }
+  }
+  const Assembler assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
+                           problem);
+  for (const int i : changed) {
+    assemble.row(i);
+    for (const int j : cloud.neighbours.of(i))
+      if (cloud.kind[j] == PointKind::surface)
+        assemble.row(j);
+  }
+  return static_cast<int>(changed.size());
+}
 
 void assemble_pressure(const Points &points, const Cloud &cloud, const PressureParams &params,
                        std::span<const Vec<2>> predicted_velocity,
@@ -400,10 +446,11 @@ Vec<2> pressure_gradient(int i, const Points &points, const Cloud &cloud,
   if (s.open)
     gradient -= weight(s.open_side.norm()) * pressure[i] *
                 (functional.topRows<2>().transpose() * s.open_side);
-  for_each_wall_row(s, cloud, [&](int m, const Projection &) {
-    const WallRow &wall = problem.wall_rows[cloud.wall_slot[i]][m];
-    gradient += wall.datum * wall.gradient;
-  });
+  else
+    for_each_wall_row(s, cloud, [&](int m, const Projection &) {
+      const WallRow &wall = problem.wall_rows[cloud.wall_slot[i]][m];
+      gradient += wall.datum * wall.gradient;
+    });
   return gradient;
 }
 

@@ -55,6 +55,15 @@ void assemble_pressure(const Points &points, const Cloud &cloud, const PressureP
                        std::span<const double> target_divergence, double dt,
                        PressureProblem &problem);
 
+/// Water next to air bears no tension: an interior point that touches an open one and whose row
+/// would pull its pressure below zero becomes open itself, pressure zero, held by no wall. So a jet
+/// separates from an edge and spray flies freely. Decided once per step, before the coupling
+/// iterates (the map stays affine). Returns the number of points released.
+int release_tension(Points &points, const Walls &walls, const PressureParams &params,
+                    std::span<const Vec<2>> predicted_velocity,
+                    std::span<const double> target_divergence, double dt, Cloud &cloud,
+                    PressureProblem &problem);
+
 /// Sets the wall data and the right-hand side for the current wall velocity.
 void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressureParams &params,
                        double dt, PressureProblem &problem);

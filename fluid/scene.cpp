@@ -167,7 +167,7 @@ Points fill(const FluidParams &params) {
   points.shift.assign(n, Vec<2>::Zero());
   points.shift_velocity.assign(n, Vec<2>::Zero());
   points.pressure.assign(n, 0);
-  points.at_surface.assign(n, 0);
+  points.at_surface.assign(n, SurfaceMemory::enclosed);
   points.id.resize(n);
   for (std::size_t i = 0; i < n; ++i)
     points.id[i] = static_cast<std::int32_t>(i);

@@ -146,6 +146,10 @@ void FluidSolver::assemble() {
     assemble_pressure(points, cloud_, pressure_params_, predicted_, target_divergence_, dt_,
                       problem_);
     report_.rows = problem_.rows;
+    if (state.step > 0) // the first step has no pressure to judge by
+      report_.released =
+        release_tension(points, walls, pressure_params_, predicted_, target_divergence_, dt_,
+                        cloud_, problem_);
   });
   timer("pressure set-up", [&] {
     std::vector<Cell> cells(points.size());

@@ -23,6 +23,7 @@ struct StepReport {
   int pressure_iterations = 0;  // over all coupling iterations of the step
   int viscous_iterations = 0;
   int pressure_solves = 0;
+  int released = 0;             // points that bear no tension next to air
 };
 
 class FluidSolver {
