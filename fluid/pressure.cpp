@@ -28,11 +28,17 @@ struct Stencil {
 
 double reach_of_rows(const Cloud &cloud) { return wall_row_reach * cloud.spacing; }
 
+// A sharp edge has no row: held at the direction towards it, a point would have to circle round the
+// edge, and the suction of that circle tears the flow off. Contact alone keeps points out.
+bool has_row(const Projection &p, const Cloud &cloud) {
+  return p.distance < reach_of_rows(cloud) && !p.at_edge;
+}
+
 template <class Visit> void for_each_wall_row(const Stencil &s, const Cloud &cloud, Visit &&visit) {
   if (!s.walls)
     return;
   for (int m = 0; m < s.walls->count; ++m)
-    if (s.walls->projection[m].distance < reach_of_rows(cloud))
+    if (has_row(s.walls->projection[m], cloud))
       visit(m, s.walls->projection[m]);
 }
 
@@ -285,8 +291,8 @@ private:
     } else {
       problem_.gradient[s.i] = linear_gradient(s, points_, cloud_);
     }
-    const bool near_wall = s.walls && s.walls->count > 0 &&
-                           s.walls->projection[0].distance < reach_of_rows(cloud_);
+    bool near_wall = false;
+    for_each_wall_row(s, cloud_, [&](int, const Projection &) { near_wall = true; });
     const bool symmetric = kind == RowKind::quadratic && !near_wall;
     update_velocity_gradient(s, symmetric ? problem_.gradient[s.i] : linear_functional(s));
     update_wall_rows(s, row.wall);
@@ -424,7 +430,7 @@ void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressurePar
     const PointWalls &projections = cloud.point_walls[k];
     for (int m = 0; m < projections.count; ++m) {
       const Projection &p = projections.projection[m];
-      if (p.distance >= reach_of_rows(cloud))
+      if (!has_row(p, cloud))
         continue;
       WallRow &wall = problem.wall_rows[k][m];
       const double wall_speed = p.normal.dot(wall_velocity(walls, p));

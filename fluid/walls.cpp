@@ -45,6 +45,15 @@ Vec<2> fluid_side(const Walls &walls, int segment, const Foot &foot) {
   return walls.normal(s);
 }
 
+bool is_sharp_edge(const Walls &walls, int segment, const Foot &foot) {
+  const WallSegment &s = walls.segments[segment];
+  if (foot.t > 0 && foot.t < 1)
+    return false;
+  constexpr double cos_30_degrees = 0.866;
+  return foot.t <= 0 || s.next < 0 ||
+         walls.tangent(s).dot(walls.tangent(walls.segments[s.next])) < cos_30_degrees;
+}
+
 Projection make_projection(const Walls &walls, int segment, const Foot &foot, const Vec<2> &x) {
   const Vec<2> side = fluid_side(walls, segment, foot);
   const Vec<2> offset = x - foot.point;
@@ -54,7 +63,8 @@ Projection make_projection(const Walls &walls, int segment, const Foot &foot, co
   const Vec<2> normal = at_vertex && length > 1e-12
                             ? Vec<2>(-sign * offset / length)
                             : Vec<2>(-side.normalized());
-  return {foot.point, normal, sign * length, foot.t, segment};
+  return {foot.point, normal, sign * length, foot.t, segment,
+          is_sharp_edge(walls, segment, foot)};
 }
 
 void insert_by_distance(PointWalls &found, const Projection &p) {

@@ -40,6 +40,7 @@ struct Projection {
   double distance; // [m], negative when the fluid point is behind the wall
   double t;        // position on the segment, 0 at vertex a, 1 at b
   int segment;
+  bool at_edge;    // on a sharp edge (turning by more than 30 degrees) or an open end: flow leaves
 };
 
 /// Wall velocity at a projection [m/s].
