@@ -12,13 +12,15 @@ Acceleration make_acceleration(const BridgeSettings &settings) {
 }
 
 AcceleratedIterate accelerate(Acceleration &acceleration, const Eigen::VectorXd &iterate,
-                              const Eigen::VectorXd &solved) {
-  return std::visit([&](auto &chosen) { return chosen.next(iterate, solved); }, acceleration);
+                              const Eigen::VectorXd &solved, double resolution) {
+  return std::visit([&](auto &chosen) { return chosen.next(iterate, solved, resolution); },
+                    acceleration);
 }
 
 void finish_window(Acceleration &acceleration, const Eigen::VectorXd &iterate,
-                   const Eigen::VectorXd &solved) {
-  std::visit([&](auto &chosen) { chosen.finish_window(iterate, solved); }, acceleration);
+                   const Eigen::VectorXd &solved, double resolution) {
+  std::visit([&](auto &chosen) { chosen.finish_window(iterate, solved, resolution); },
+             acceleration);
 }
 
 } // namespace sluice::bridge

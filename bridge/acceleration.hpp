@@ -15,10 +15,10 @@ namespace sluice::bridge {
 class ConstantRelaxation {
 public:
   explicit ConstantRelaxation(double relaxation) : relaxation_(relaxation) {}
-  AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved) {
+  AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved, double) {
     return {iterate + relaxation_ * (solved - iterate), relaxation_, 0};
   }
-  void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &) {}
+  void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, double) {}
 
 private:
   double relaxation_;
@@ -29,11 +29,12 @@ using Acceleration = std::variant<ConstantRelaxation, Aitken, QuasiNewton>;
 /// The accelerator that `settings` names.
 Acceleration make_acceleration(const BridgeSettings &settings);
 
-/// The next iterate of the current window.
+/// The next iterate of the current window. Changes of the residual below `resolution` [m, norm over
+/// all nodes] are rounding or the solvers' noise: nothing is learnt from them.
 AcceleratedIterate accelerate(Acceleration &acceleration, const Eigen::VectorXd &iterate,
-                              const Eigen::VectorXd &solved);
+                              const Eigen::VectorXd &solved, double resolution);
 /// The window is accepted with its last iterate and solution: history moves on.
 void finish_window(Acceleration &acceleration, const Eigen::VectorXd &iterate,
-                   const Eigen::VectorXd &solved);
+                   const Eigen::VectorXd &solved, double resolution);
 
 } // namespace sluice::bridge

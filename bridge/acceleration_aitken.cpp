@@ -17,7 +17,8 @@ double within_reason(double relaxation) {
 
 } // namespace
 
-AcceleratedIterate Aitken::next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved) {
+AcceleratedIterate Aitken::next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
+                                double) {
   const Eigen::VectorXd residual = solved - iterate;
   if (last_residual_.size() > 0) {
     const Eigen::VectorXd change = residual - last_residual_;
@@ -28,7 +29,7 @@ AcceleratedIterate Aitken::next(const Eigen::VectorXd &iterate, const Eigen::Vec
   return {iterate + relaxation_ * residual, relaxation_, 0};
 }
 
-void Aitken::finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &) {
+void Aitken::finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, double) {
   last_residual_.resize(0);
 }
 

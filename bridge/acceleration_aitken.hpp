@@ -19,8 +19,9 @@ struct AcceleratedIterate {
 class Aitken {
 public:
   explicit Aitken(double initial_relaxation) : relaxation_(initial_relaxation) {}
-  AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
-  void finish_window(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved);
+  AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
+                          double = 0);
+  void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, double = 0);
 
 private:
   double relaxation_;

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "bridge/acceleration_iqn.hpp"
 
+#include <algorithm>
+
 namespace sluice::bridge {
 
 // V = Q R column by column, with the W that belongs to it. Q's columns are kept apart.
@@ -60,22 +62,24 @@ void QuasiNewton::distrust(const Eigen::VectorXd &residual) {
     history_.resize(1);
 }
 
-// A change of rounding size carries no direction.
-void QuasiNewton::remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved) {
+// A change of the size of rounding or noise has no direction; as the newest column it would come
+// first and bend all others.
+void QuasiNewton::remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
+                           double resolution) {
   const Eigen::VectorXd residual = solved - iterate;
   distrust(residual);
   if (last_residual_.size() > 0) {
     const Eigen::VectorXd change = residual - last_residual_;
-    if (change.norm() > 1e-14 * solved.norm())
+    if (change.norm() > std::max(resolution, 1e-14 * solved.norm()))
       history_.front().push_back({change, solved - last_solved_});
   }
   last_residual_ = residual;
   last_solved_ = solved;
 }
 
-AcceleratedIterate QuasiNewton::next(const Eigen::VectorXd &iterate,
-                                     const Eigen::VectorXd &solved) {
-  remember(iterate, solved);
+AcceleratedIterate QuasiNewton::next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
+                                     double resolution) {
+  remember(iterate, solved, resolution);
   const Eigen::VectorXd residual = solved - iterate;
   const LeastSquares system = orthogonalised(residual.size());
   if (system.q.empty())
@@ -83,8 +87,9 @@ AcceleratedIterate QuasiNewton::next(const Eigen::VectorXd &iterate,
   return {solved + system.correction(residual), 1, static_cast<int>(system.q.size())};
 }
 
-void QuasiNewton::finish_window(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved) {
-  remember(iterate, solved);
+void QuasiNewton::finish_window(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
+                                double resolution) {
+  remember(iterate, solved, resolution);
   last_residual_.resize(0);
   last_solved_.resize(0);
   history_.emplace_front();

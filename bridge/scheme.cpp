@@ -40,7 +40,8 @@ IterationRecord Scheme::advance(const InterfaceState &solved, const Eigen::Vecto
                                 double dt, double dt_next) {
   IterationRecord record = judge(solved, force);
   if (record.verdict == Verdict::converged && settings_.is_implicit())
-    finish_window(acceleration_, stacked(iterate_, dt), stacked(solved, dt));
+    finish_window(acceleration_, stacked(iterate_, dt), stacked(solved, dt),
+                  resolution(solved, dt));
   if (record.verdict == Verdict::converged)
     accept(solved, dt, dt_next);
   if (record.verdict == Verdict::iterate)
@@ -75,6 +76,12 @@ void Scheme::accept(const InterfaceState &solved, double dt, double dt_next) {
   iteration_ = 1;
 }
 
+// Differences ten times below what counts as converged are taken for noise of the solvers.
+double Scheme::resolution(const InterfaceState &solved, double dt) const {
+  return 0.1 * settings_.displacement_tolerance *
+         (stacked(solved, dt) - stacked(accepted_, dt)).norm();
+}
+
 InterfaceState Scheme::prediction(double dt, double dt_next) const {
   const Eigen::VectorXd velocity =
       accepted_.velocity + (accepted_.velocity - velocity_before_) * (dt_next / dt);
@@ -83,7 +90,7 @@ InterfaceState Scheme::prediction(double dt, double dt_next) const {
 
 void Scheme::iterate_again(const InterfaceState &solved, double dt, IterationRecord &record) {
   const AcceleratedIterate result =
-      accelerate(acceleration_, stacked(iterate_, dt), stacked(solved, dt));
+      accelerate(acceleration_, stacked(iterate_, dt), stacked(solved, dt), resolution(solved, dt));
   record.relaxation = result.relaxation;
   record.columns = result.columns;
   if (!result.next.allFinite())

@@ -55,6 +55,7 @@ private:
   IterationRecord judge(const InterfaceState &solved, const Eigen::VectorXd &force);
   void accept(const InterfaceState &solved, double dt, double dt_next);
   void iterate_again(const InterfaceState &solved, double dt, IterationRecord &record);
+  double resolution(const InterfaceState &solved, double dt) const;
   InterfaceState prediction(double dt, double dt_next) const;
 
   BridgeSettings settings_;

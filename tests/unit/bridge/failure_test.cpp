@@ -99,7 +99,7 @@ TEST_P(EitherSide, a_partner_that_never_starts_is_named_with_the_address) {
   });
   expect_message(error, {"the " + self() + " waited 0.2 s for the " + other(),
                          folder.path().string() + "/bridge.sock", "connect_deadline_s"});
-  EXPECT_LT(watch.seconds(), 0.6);
+  EXPECT_LT(watch.seconds(), 2);
 }
 
 TEST_P(EitherSide, a_partner_that_dies_without_a_word_is_noticed_at_once) {
@@ -107,26 +107,26 @@ TEST_P(EitherSide, a_partner_that_dies_without_a_word_is_noticed_at_once) {
       survive(self(), Piston(), in_window_five([](auto &) { ::_exit(3); }));
   expect_message(error, {"the " + other() + " ended without a word", "the " + self() + " awaited",
                          "iteration 1 of window 5", "t = 0.004"});
-  EXPECT_LT(seconds, 1.5);
+  EXPECT_LT(seconds, 3);
 }
 
 TEST_P(EitherSide, a_partner_that_stops_breathing_is_given_up_after_the_silence_deadline) {
   Piston piston;
-  piston.silence_deadline = 0.5;
+  piston.silence_deadline = 0.8;
   const auto [error, seconds] =
       survive(self(), piston, in_window_five([](auto &) { ::raise(SIGSTOP); }));
-  expect_message(error, {"the " + other() + " was silent for 0.5 s", "awaited", "window 5"});
-  EXPECT_LT(seconds, 1.5);
+  expect_message(error, {"the " + other() + " was silent for 0.8 s", "awaited", "window 5"});
+  EXPECT_LT(seconds, 3);
 }
 
 TEST_P(EitherSide, a_long_step_is_not_a_dead_partner) {
   Piston piston;
-  piston.silence_deadline = 0.3;
+  piston.silence_deadline = 0.6;
   piston.windows = 6;
   const auto [error, seconds] =
-      survive(self(), piston, in_window_five([](auto &) { ::usleep(900'000); }));
+      survive(self(), piston, in_window_five([](auto &) { ::usleep(1'500'000); }));
   EXPECT_EQ(error, "");
-  EXPECT_GT(seconds, 0.9);
+  EXPECT_GT(seconds, 1.5);
 }
 
 TEST_P(EitherSide, an_exception_reaches_the_partner_word_for_word) {
@@ -148,7 +148,7 @@ TEST_P(EitherSide, a_program_that_unwinds_without_telling_still_says_that_it_end
   const auto [error, seconds] =
       survive(self(), Piston(), in_window_five([](auto &) { throw std::runtime_error("?"); }));
   expect_message(error, {"the " + other() + " gave up", "ended before the run was complete"});
-  EXPECT_LT(seconds, 1.5);
+  EXPECT_LT(seconds, 3);
 }
 
 TEST_P(EitherSide, values_that_are_not_finite_stop_at_the_border_with_node_and_value) {
