@@ -36,14 +36,10 @@ inline Basis normal_derivative(const Vec<2> &q, const Vec<2> &n) {
 class QuadraticFit {
 public:
   void add(const Basis &row, double w) { moment_.noalias() += (w * row) * row.transpose(); }
-  /// False when the cloud does not determine a quadratic: a pivot below 2e-3 of the
-  /// largest (a lattice has 3e-2; below, the gradient amplifies noise tenfold).
+  /// False when the moment matrix is singular.
   bool factorise() {
     cholesky_.compute(moment_);
-    if (cholesky_.info() != Eigen::Success)
-      return false;
-    const auto pivots = cholesky_.matrixLLT().diagonal().array().square();
-    return pivots.minCoeff() > 2e-3 * pivots.maxCoeff();
+    return cholesky_.info() == Eigen::Success;
   }
   Basis solve(const Basis &functional) const { return cholesky_.solve(functional); }
 
