@@ -16,9 +16,12 @@ namespace {
 /// The coupled walls as the bridge sees them, and the way back.
 class CoupledSurface {
 public:
-  explicit CoupledSurface(const Walls &walls) : reference_(walls.position) {
+  explicit CoupledSurface(const Walls &walls)
+      : reference_(walls.position), displacement_(walls.position.size(), Vec<2>::Zero()) {
     values_.resize(2 * walls.coupled_vertices.size());
   }
+  /// Per wall vertex, as last read [m].
+  const std::vector<Vec<2>> &displacement() const { return displacement_; }
 
   bridge::InterfaceMesh mesh(const Walls &walls) const {
     bridge::InterfaceMesh mesh;
@@ -38,7 +41,8 @@ public:
     bridge.read_data("displacement", relative_time, values_);
     for (std::size_t k = 0; k < walls.coupled_vertices.size(); ++k) {
       const int v = walls.coupled_vertices[k];
-      walls.position[v] = reference_[v] + Vec<2>(values_[2 * k], values_[2 * k + 1]);
+      displacement_[v] = {values_[2 * k], values_[2 * k + 1]};
+      walls.position[v] = reference_[v] + displacement_[v];
     }
   }
 
@@ -58,7 +62,7 @@ public:
   }
 
 private:
-  std::vector<Vec<2>> reference_;
+  std::vector<Vec<2>> reference_, displacement_;
   std::vector<double> values_;
 };
 
@@ -72,11 +76,12 @@ public:
 
   void alone() {
     const long n = settings_.n_windows();
+    const std::vector<Vec<2>> at_rest(solver_.walls.position.size(), Vec<2>::Zero());
     for (long window = 1; window <= n; ++window) {
       solver_.begin_step(settings_.time_step);
       solver_.iterate();
       solver_.end_step();
-      finish_step(solver_.walls.position, static_cast<double>(window) * settings_.time_step);
+      finish_step(at_rest, static_cast<double>(window) * settings_.time_step);
     }
   }
 
@@ -90,7 +95,7 @@ public:
       const bool is_first = bridge.iteration() == 1;
       if (is_first) {
         surface.read_positions(bridge, 0, solver_.walls);
-        start_ = solver_.walls.position;
+        start_ = surface.displacement();
         if (repeats_step)
           saved_ = solver_.state;
       } else if (repeats_step) {
@@ -108,7 +113,10 @@ public:
         continue;
       solver_.end_step();
       surface.read_positions(bridge, 0, solver_.walls);
-      finish_step(start_, bridge.time());
+      std::vector<Vec<2>> increment = surface.displacement();
+      for (std::size_t v = 0; v < increment.size(); ++v)
+        increment[v] -= start_[v];
+      finish_step(increment, bridge.time());
     }
     bridge.finalize();
   }
@@ -121,8 +129,8 @@ public:
   }
 
 private:
-  void finish_step(std::span<const Vec<2>> walls_before, double time) {
-    history_.record(solver_, walls_before, time);
+  void finish_step(std::span<const Vec<2>> increment, double time) {
+    history_.record(solver_, increment, time);
     progress_.update(time, history_.note());
   }
 
@@ -132,7 +140,7 @@ private:
   History history_;
   Progress progress_;
   FluidState saved_;
-  std::vector<Vec<2>> start_;
+  std::vector<Vec<2>> start_; // displacement of the wall vertices at the window's start [m]
 };
 
 } // namespace

@@ -35,9 +35,10 @@ History::History(const Scene &scene, const FluidSolver &solver, std::filesystem:
     start_.potential -= mass * params.gravity.dot(x);
   initial_volume_ = solver.state.points.size() * params.spacing * params.spacing;
   last_ = start_;
+  write_fields(solver, 0);
 }
 
-void History::record_loads(const FluidSolver &solver, std::span<const Vec<2>> previous,
+void History::record_loads(const FluidSolver &solver, std::span<const Vec<2>> increment,
                            double time) {
   const Walls &walls = solver.walls;
   Vec<2> force = Vec<2>::Zero();
@@ -50,7 +51,7 @@ void History::record_loads(const FluidSolver &solver, std::span<const Vec<2>> pr
       return (1 - s.t) * v[segment.a] + s.t * v[segment.b];
     };
     const Vec<2> f = s.length * solver.tractions()[k];
-    const Vec<2> x = at(walls.position), moved = x - at(previous);
+    const Vec<2> x = at(walls.position), moved = at(increment);
     force += f;
     magnitude += f.norm();
     moment += cross(x, f);
@@ -84,8 +85,8 @@ void History::update_extremes(const FluidSolver &solver, const Integrals &now) {
   ++steps_;
 }
 
-void History::record(const FluidSolver &solver, std::span<const Vec<2>> previous, double time) {
-  record_loads(solver, previous, time);
+void History::record(const FluidSolver &solver, std::span<const Vec<2>> increment, double time) {
+  record_loads(solver, increment, time);
   const Integrals now = integrate(solver);
   const Vec<2> wall_force = force_on_all_walls(solver);
   outlet_energy_ = solver.outlet_energy();
@@ -106,13 +107,17 @@ void History::record(const FluidSolver &solver, std::span<const Vec<2>> previous
   for (const GaugeParams &gauge : gauges_)
     row.push_back(water_level(state.points, gauge.x, spacing));
   series_.row(row);
-  if (output_interval_ > 0 && (time >= next_output_ - 1e-9 * output_interval_)) {
-    points_.write(state.points, solver.cloud(), state.step, time);
-    walls_.write(solver.walls, state.step, time);
-    next_output_ += output_interval_ * std::ceil((time - next_output_) / output_interval_ + 1e-6);
-  }
+  write_fields(solver, time);
   last_ = now;
   last_time_ = time;
+}
+
+void History::write_fields(const FluidSolver &solver, double time) {
+  if (output_interval_ <= 0 || time < next_output_ - 1e-9 * output_interval_)
+    return;
+  points_.write(solver.state.points, solver.cloud(), solver.state.step, time);
+  walls_.write(solver.walls, solver.state.step, time);
+  next_output_ += output_interval_ * std::ceil((time - next_output_) / output_interval_ + 1e-6);
 }
 
 std::string History::note() const {

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace sluice::fluid {
 
@@ -115,22 +116,35 @@ Vec<2> push_apart(int i, const Points &points, const Cloud &cloud, double closes
   return push;
 }
 
+// Two numbers in [-1, 1] that depend on the point and the step alone (SplitMix64 by S. Vigna).
+Vec<2> disturbance(std::int32_t id, std::int64_t step) {
+  std::uint64_t z = static_cast<std::uint64_t>(id) * 0x9e3779b97f4a7c15u +
+                    static_cast<std::uint64_t>(step) * 0xd1b54a32d192ed03u;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+  z ^= z >> 31;
+  const double scale = 1.0 / 2147483648.0;
+  return {static_cast<double>(z & 0xffffffffu) * scale - 1, static_cast<double>(z >> 32) * scale - 1};
+}
+
 } // namespace
 
 void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
-                std::span<const Mat<2>> velocity_gradient, double dt) {
+                std::span<const Mat<2>> velocity_gradient, double dt, std::int64_t step) {
   const double closest = params.closest_pair * cloud.spacing;
   const double longest = 0.1 * cloud.spacing;
   for_each_point(points.size(), [&](int i) {
     const Mat<2> &g = velocity_gradient[i];
     const double strain_rate = (g + g.transpose()).norm() / std::sqrt(2.0);
-    const double fraction = std::min(params.regularity * strain_rate * dt, 0.5);
-    Vec<2> towards_centroid = cloud.centroid_offset[i];
+    const double strain = std::min(strain_rate * dt, 0.25);
+    Vec<2> shift = params.regularity * strain * cloud.centroid_offset[i] +
+                   params.agitation * std::sqrt(1.5 * strain) * cloud.spacing *
+                       disturbance(points.id[i], step);
     const Vec<2> &n = cloud.surface_normal[i];
-    towards_centroid -= n.dot(towards_centroid) * n;
+    shift -= n.dot(shift) * n;
     if (cloud.kind[i] == PointKind::thin)
-      towards_centroid.setZero();
-    Vec<2> shift = fraction * towards_centroid + push_apart(i, points, cloud, closest);
+      shift.setZero();
+    shift += push_apart(i, points, cloud, closest);
     const double length = shift.norm();
     if (length > longest)
       shift *= longest / length;

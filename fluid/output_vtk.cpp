@@ -87,16 +87,17 @@ vtkNew<vtkCellArray> one_vertex_per_point(std::size_t n) {
 void PointOutput::write(const Points &points, const Cloud &cloud, std::int64_t step, double time) {
   vtkNew<vtkPolyData> data;
   const std::size_t n = points.position.size();
+  const bool is_frozen = cloud.kind.size() == n; // not before the first step
   data->SetPoints(to_vtk_points(points.position));
   data->SetVerts(one_vertex_per_point(n));
   add_array<vtkFloatArray>(data->GetPointData(), "pressure", n,
                            [&](std::size_t i) { return points.pressure[i]; });
   add_array<vtkUnsignedCharArray>(data->GetPointData(), "kind", n,
-                                  [&](std::size_t i) { return static_cast<int>(cloud.kind[i]); });
+                                  [&](std::size_t i) { return is_frozen ? static_cast<int>(cloud.kind[i]) : 0; });
   add_array<vtkIntArray>(data->GetPointData(), "id", n,
                          [&](std::size_t i) { return points.id[i]; });
   add_array<vtkFloatArray>(data->GetPointData(), "volume", n,
-                           [&](std::size_t i) { return cloud.cell_area[i]; });
+                           [&](std::size_t i) { return is_frozen ? cloud.cell_area[i] : 0.0; });
   add_vectors(data->GetPointData(), "velocity", points.velocity);
   const auto file = next_file(step);
   write_file(file, data);

@@ -45,6 +45,8 @@ struct FluidParams {
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
     read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
         .at_least(0);
+    read("agitation", motion.agitation, "disturbance of the points per root of strain, in spacings")
+        .at_least(0);
     read("volume_rate", motion.volume_rate, "decay of volume errors, in sqrt(g / spacing)")
         .at_least(0);
     read("closest_pair", motion.closest_pair, "closest distance of two points, in spacings")

@@ -60,7 +60,8 @@ void FluidSolver::end_step() {
       points.velocity[i] = predicted_[i] - factor * pressure_gradient(i, points, cloud_, problem_,
                                                                       points.pressure);
     });
-    plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
+    plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_,
+               state.step);
   });
   ++state.step;
 }
