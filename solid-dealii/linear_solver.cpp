@@ -17,8 +17,7 @@ LinearSolver::LinearSolver(const Eigen::SparseMatrix<double> &pattern)
   impl_->umfpack.umfpackControl()(UMFPACK_STRATEGY) = UMFPACK_STRATEGY_SYMMETRIC;
   impl_->umfpack.analyzePattern(pattern);
   check(impl_->umfpack.info() == Eigen::Success,
-        "solid: UMFPACK could not analyse the sparsity of {} unknowns (status {})", pattern.rows(),
-        impl_->umfpack.umfpackFactorizeReturncode());
+        "solid: UMFPACK could not analyse the sparsity of {} unknowns", pattern.rows());
 }
 
 LinearSolver::~LinearSolver() = default;

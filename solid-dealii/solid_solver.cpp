@@ -80,6 +80,7 @@ SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd
                                   const SolidState *guess) {
   check(load.allFinite(), "solid: a nodal force is not finite in step {}", start.step + 1);
   const Stopwatch watch;
+  const double cpu_start = process_cpu_time();
   const Equation equation = integrator_.equation(
       start, assembly_.internal_force(start.displacement, start.modes), load, dt);
   // The constant-acceleration predictor can invert an element where the load is rough; the
@@ -97,6 +98,7 @@ SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd
     SolidState end = integrator_.finish(start, iterate, dt);
     end.load_work += load.dot(end.displacement - start.displacement);
     counts_.seconds += watch.seconds();
+    counts_.cpu_seconds += process_cpu_time() - cpu_start;
     return end;
   }
   fail("solid: step {} of {:.3g} s has no solution: {}; the largest nodal force is {:.3g} N. "

@@ -17,7 +17,8 @@ struct SolverCounts {
   long iterations = 0;      ///< Newton iterations of all of them
   int iterations_max = 0;   ///< of one
   long rejected_starts = 0; ///< first guesses that were inverted or did not converge
-  double seconds = 0;       ///< [s] wall time in them
+  double seconds = 0;       ///< [s] wall time in step()
+  double cpu_seconds = 0;   ///< [s] CPU time in step()
 };
 
 /// The side that a key's value names: "left", "right", "lower" or "upper".
