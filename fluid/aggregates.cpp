@@ -13,6 +13,17 @@ std::size_t hash(CellKey key) {
 
 } // namespace
 
+void find_isolated(const SlicedPattern &pattern, const std::vector<float> &off_diagonal,
+                   std::vector<char> &is_isolated) {
+  is_isolated.resize(pattern.rows);
+  for_each_index(pattern.rows, [&](int i) {
+    bool isolated = true;
+    for (int k = 0; k < pattern.width(i) && isolated; ++k)
+      isolated = off_diagonal[pattern.place(i, k)] == 0;
+    is_isolated[i] = isolated;
+  });
+}
+
 void AggregateFinder::find(const UnitDiagonalView &matrix, const std::vector<Cell> &cells,
                            Aggregates &result) {
   const int n = matrix.rows();
@@ -48,7 +59,7 @@ void AggregateFinder::number_cells(const UnitDiagonalView &matrix, const std::ve
   key_.clear();
   result.cell.clear();
   cell_of_.resize(n);
-  for_each_index(n, [&](int i) { cell_of_[i] = matrix.is_isolated(i) ? -1 : 0; });
+  for_each_index(n, [&](int i) { cell_of_[i] = matrix.is_isolated[i] ? -1 : 0; });
   for (int i = 0, last = -1; i < n; ++i) {
     if (cell_of_[i] < 0)
       continue;
@@ -82,9 +93,12 @@ void AggregateFinder::list_members(const std::vector<int> &of_row, Aggregates &r
   for (int a = 0, total = 0; a <= result.count(); ++a)
     start[a] = total += start[a];
   result.member.resize(start.back());
+  result.place_of_row.assign(of_row.size(), -1);
   for (int i = static_cast<int>(of_row.size()) - 1; i >= 0; --i)
-    if (of_row[i] >= 0)
-      result.member[--start[of_row[i]]] = i;
+    if (of_row[i] >= 0) {
+      result.place_of_row[i] = --start[of_row[i]];
+      result.member[result.place_of_row[i]] = i;
+    }
 }
 
 int AggregateFinder::root(int i) {

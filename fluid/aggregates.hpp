@@ -30,6 +30,7 @@ inline CellKey key_of(const Cell &cell) {
 struct UnitDiagonalView {
   const SlicedPattern &pattern;
   const std::vector<float> &off_diagonal;
+  const std::vector<char> &is_isolated; ///< [rows] whether a row has no off-diagonal entry
 
   int rows() const { return pattern.rows; }
   /// Calls body(column, value) for the entries of row i of O that are not zero.
@@ -40,13 +41,11 @@ struct UnitDiagonalView {
       if (off_diagonal[at] != 0)
         body(pattern.column[at], off_diagonal[at]);
   }
-  bool is_isolated(int i) const {
-    for (int k = 0; k < pattern.width(i); ++k)
-      if (off_diagonal[pattern.place(i, k)] != 0)
-        return false;
-    return true;
-  }
 };
+
+/// Marks the rows whose entries are all zero.
+void find_isolated(const SlicedPattern &pattern, const std::vector<float> &off_diagonal,
+                   std::vector<char> &is_isolated);
 
 /// Disjoint sets of rows, one per occupied cell. Rows in none (-1) are those without off-diagonal
 /// entries, which dividing by the diagonal solves, and detached pieces in the cell of a larger one.
@@ -55,6 +54,7 @@ struct Aggregates {
   std::vector<CellKey> key_of_row;       ///< [rows] cell of the aggregate or no_cell
   std::vector<Cell> cell;                ///< [aggregates]
   std::vector<int> member_start, member; ///< rows of each aggregate, ascending
+  std::vector<int> place_of_row;         ///< [rows] where a row stands in member, or -1
 
   int count() const { return static_cast<int>(cell.size()); }
 };
@@ -72,7 +72,7 @@ private:
   void number_cells(const UnitDiagonalView &matrix, const std::vector<Cell> &cells,
                     Aggregates &result);
   int number_of(const Cell &cell, Aggregates &result);
-  static void list_members(const std::vector<int> &of_row, Aggregates &result);
+  void list_members(const std::vector<int> &of_row, Aggregates &result);
   void keep_largest_part(const UnitDiagonalView &matrix, int cell, Aggregates &result);
   bool connect(const UnitDiagonalView &matrix, int cell, const Aggregates &aggregates);
   int root(int i);

@@ -3,6 +3,7 @@
 
 #include "fluid/gather.hpp"
 
+#include <bit>
 #include <cmath>
 
 namespace sluice::fluid {
@@ -81,12 +82,13 @@ public:
   static constexpr int shifts = power(3, dim);
   static constexpr int a_p_size = dim == 2 ? 32 : 128; // 25 or 125 places used
   static constexpr int p_size = a_p_size;              // 13 or 63 places used
-  static constexpr int coarse_size = power(7, dim);
+  static constexpr int coarse_size = dim == 2 ? 64 : 352; // 49 or 343 places used
   static constexpr int width = dim == 2 ? 16 : 32; // of the windows kept for the transfers
-  static constexpr int centre = shifts / 2, coarse_centre = coarse_size / 2;
+  static constexpr int centre = shifts / 2, coarse_centre = power(7, dim) / 2;
+  static constexpr int lanes = SlicedPattern::lanes;
   // In place of a shift: a column in no aggregate, and one of an aggregate that is not next to the
   // row's, for which the row's own is taken.
-  static constexpr std::int8_t nowhere = -1, elsewhere = centre;
+  static constexpr std::int8_t nowhere = shifts, elsewhere = centre;
 
   Windows(GalerkinProduct &memory, const UnitDiagonalView &matrix, const Aggregates &aggregates,
           const AggregateFinder &finder, const CoarseningParams &params, CoarseLevel &result)
@@ -95,7 +97,6 @@ public:
 
   void build() {
     find_neighbours();
-    find_shifts();
     compute_p();
     compute_a_p();
     compute_coarse();
@@ -121,6 +122,19 @@ private:
   }
   static constexpr auto in_five = offsets(5), in_seven = offsets(7);
 
+  // For each shift and place in a window of 7 cells per direction, the place in one of 5 that lands
+  // there, or the last place, which is always zero. Plane only.
+  static constexpr auto places_from_five() {
+    std::array<std::array<int, 64>, shifts> from{};
+    for (int s = 0; s < shifts; ++s)
+      for (int w = 0; w < 64; ++w) {
+        const int x = w % 7 - s % 3, y = w / 7 - s / 3;
+        from[s][w] = x >= 0 && x < 5 && y >= 0 && y < 5 ? x + 5 * y : 31;
+      }
+    return from;
+  }
+  static constexpr auto from_five = places_from_five();
+
   static std::int8_t shift_between(CellKey from, CellKey to) {
     constexpr CellKey mask = (1 << 21) - 1, one = 1;
     const CellKey e = to - from + one + (one << 21) + (dim == 3 ? one << 42 : 0);
@@ -129,12 +143,20 @@ private:
     const auto shift = static_cast<std::int8_t>(x + 3 * y + 9 * z);
     return to == no_cell ? nowhere : is_next ? shift : elsewhere;
   }
-  static CellKey key_of_shift(int place, int width) {
-    Cell cell{};
-    for (int d = 0; d < dim; ++d, place /= width)
-      cell[d] = place % width - width / 2;
-    return key_of(cell);
+  // Key of the step from the middle of a window to a place in it.
+  static constexpr CellKey key_of_step(int place, int cells) {
+    CellKey key = 0;
+    for (int d = dim - 1; d >= 0; --d)
+      key = (key << 21) + place / power(cells, d) % cells - cells / 2;
+    return key;
   }
+  static constexpr auto coarse_keys() {
+    std::array<CellKey, power(7, dim)> keys{};
+    for (int w = 0; w < power(7, dim); ++w)
+      keys[w] = key_of_step(w, 7);
+    return keys;
+  }
+  static constexpr auto coarse_key = coarse_keys();
 
   float *p(int i) { return &m_.p_[(static_cast<std::size_t>(i) + 1) * p_size]; }
   float *a_p(int i) { return &m_.a_p_[static_cast<std::size_t>(i) * a_p_size]; }
@@ -151,27 +173,10 @@ private:
     for_each_index(aggregates_.count(), [&](int a) {
       const CellKey key = key_of(aggregates_.cell[a]);
       for (int s = 0; s < width; ++s) {
-        const int next = s < shifts ? finder_.aggregate_in(key + key_of_shift(s, 3)) : -1;
+        const int next = s < shifts ? finder_.aggregate_in(key + key_of_step(s, 3)) : -1;
         transfer_.neighbour[a * width + s] = next;
         transfer_.source[a * width + s] = next < 0 ? -1 : next * width + shifts - 1 - s;
       }
-    });
-  }
-
-  void find_shifts() {
-    const SlicedPattern &pattern = matrix_.pattern;
-    m_.shift_.resize(pattern.stored());
-    for_each_index(pattern.slices(), [&](int s) {
-      constexpr int lanes = SlicedPattern::lanes;
-      std::array<CellKey, lanes> from;
-      for (int lane = 0; lane < lanes; ++lane)
-        from[lane] = aggregates_.key_of_row[std::min(s * lanes + lane, matrix_.rows() - 1)];
-      const std::size_t begin = pattern.place(s * lanes, 0);
-      const std::size_t end = begin + static_cast<std::size_t>(pattern.width(s * lanes)) * lanes;
-      for (std::size_t at = begin; at < end; at += lanes)
-        for (int lane = 0; lane < lanes; ++lane)
-          m_.shift_[at + lane] =
-              shift_between(from[lane], aggregates_.key_of_row[pattern.column[at + lane]]);
     });
   }
 
@@ -186,28 +191,49 @@ private:
   }
 
   void compute_p() {
+    const int n_slices = matrix_.pattern.slices();
+    m_.shift_.resize(matrix_.pattern.stored());
     transfer_.weight.resize(aggregates_.member.size() * width);
     m_.p_.resize((static_cast<std::size_t>(matrix_.rows()) + 1) * p_size);
     std::fill_n(m_.p_.begin(), p_size, 0.0f);
-    for_each_index(matrix_.rows(), [&](int i) {
-      if (aggregates_.of_row[i] < 0)
-        std::fill_n(p(i), p_size, 0.0f);
+    for_each_block(n_slices, [&](IndexRange range, int) {
+      for (int s = range.begin; s < range.end; ++s)
+        compute_p_of_slice(s);
     });
-    for_each_index(static_cast<int>(aggregates_.member.size()), [&](int m) { compute_p(m); });
   }
 
-  void compute_p(int m) {
-    const int i = aggregates_.member[m];
-    std::array<float, width> window{};
-    window[centre] = 1 - params_.prolongation_weight;
-    for_each_shifted(i, [&](int, int shift, float value) {
-      window[shift] -= params_.prolongation_weight * value;
-    });
-    std::copy(window.begin(), window.end(), weight(m));
-    std::array<float, p_size> spread{};
+  // Sixteen rows at a time, so that no sum waits for the one before it.
+  void compute_p_of_slice(int slice) {
+    const SlicedPattern &pattern = matrix_.pattern;
+    const int first = slice * lanes, count = std::min(lanes, matrix_.rows() - first);
+    std::array<CellKey, lanes> from;
+    for (int lane = 0; lane < lanes; ++lane)
+      from[lane] = aggregates_.key_of_row[first + std::min(lane, count - 1)];
+    std::array<std::array<float, lanes>, shifts + 1> sum{}; // the last for entries to nowhere
+    const std::size_t begin = pattern.place(first, 0);
+    const std::size_t end = begin + static_cast<std::size_t>(pattern.width(first)) * lanes;
+    for (std::size_t at = begin; at < end; at += lanes)
+      for (int lane = 0; lane < lanes; ++lane) {
+        const CellKey to = aggregates_.key_of_row[pattern.column[at + lane]];
+        const std::int8_t shift = shift_between(from[lane], to);
+        m_.shift_[at + lane] = shift;
+        sum[shift][lane] += matrix_.off_diagonal[at + lane];
+      }
+    for (int lane = 0; lane < count; ++lane)
+      store_p(first + lane, [&](int shift) { return sum[shift][lane]; });
+  }
+
+  template <class Sum> void store_p(int i, Sum &&sum) {
+    std::fill_n(p(i), p_size, 0.0f);
+    const int place = aggregates_.place_of_row[i];
+    if (place < 0)
+      return;
+    float *window = weight(place);
+    std::fill_n(window, width, 0.0f);
     for (int s = 0; s < shifts; ++s)
-      spread[in_five[s]] = window[s];
-    std::copy(spread.begin(), spread.end(), p(i));
+      window[s] = (s == centre) - params_.prolongation_weight * ((s == centre) + sum(s));
+    for (int s = 0; s < shifts; ++s)
+      p(i)[in_five[s]] = window[s];
   }
 
   void compute_a_p() {
@@ -258,40 +284,58 @@ private:
       if (neighbour(a, s) >= 0)
         add_members(neighbour(a, s), s, window, size);
     m_.row_start_[a] = static_cast<int>(block.column.size());
-    float diagonal = window[coarse_centre];
-    const float threshold = params_.drop_tolerance * std::abs(diagonal);
-    const CellKey key = key_of(aggregates_.cell[a]);
-    for (int w = 0; w < coarse_size; ++w) {
-      if (w == coarse_centre || window[w] == 0)
-        continue;
-      const int c =
-          std::abs(window[w]) < threshold ? -1 : finder_.aggregate_in(key + key_of_shift(w, 7));
-      if (c < 0) {
-        diagonal += window[w];
-        continue;
-      }
-      block.column.push_back(c);
-      block.value.push_back(window[w]);
-    }
+    const float lumped = keep_large(a, window, block);
     block.length.push_back(static_cast<int>(block.column.size()) - m_.row_start_[a]);
+    const float diagonal = window[coarse_centre] + lumped;
     result_.scale[a] = diagonal > vanishing * size ? 1 / diagonal : 0;
+  }
+
+  // Moves the large off-diagonal entries of a row into the block; returns the sum of the others.
+  float keep_large(int a, const CoarseWindow &window, Block &block) const {
+    const float threshold = params_.drop_tolerance * std::abs(window[coarse_centre]);
+    const CellKey key = key_of(aggregates_.cell[a]);
+    Lanes<float> small{};
+    float homeless = 0; // moved there by an entry that reached too far
+    for (int part = 0; part < coarse_size; part += lanes) {
+      for (int l = 0; l < lanes; ++l)
+        small[l] += std::abs(window[part + l]) > threshold ? 0 : window[part + l];
+      for (unsigned bits = larger_lanes(&window[part], threshold); bits != 0; bits &= bits - 1) {
+        const int w = part + std::countr_zero(bits);
+        if (w == coarse_centre)
+          continue;
+        const int column = finder_.aggregate_in(key + coarse_key[w]);
+        if (column < 0)
+          homeless += window[w];
+        else {
+          block.column.push_back(column);
+          block.value.push_back(window[w]);
+        }
+      }
+    }
+    return sum_of(small) + homeless;
   }
 
   // Adds the rows of A P in the cell `shift` of an aggregate, each times its entry of R.
   void add_members(int from, int shift, CoarseWindow &window, float &size) {
     std::array<float, a_p_size> total{};
     for (int m = aggregates_.member_start[from]; m < aggregates_.member_start[from + 1]; ++m) {
-      const int i = aggregates_.member[m];
       const float r = weight(m)[shifts - 1 - shift];
+      const float *row = a_p(aggregates_.member[m]);
       size += std::abs(r);
       for (int l = 0; l < a_p_size; ++l)
-        total[l] += r * a_p(i)[l];
+        total[l] += r * row[l];
     }
-    constexpr int planes = dim == 3 ? 5 : 1;
-    for (int z = 0; z < planes; ++z)
-      for (int y = 0; y < 5; ++y)
-        for (int x = 0; x < 5; ++x)
-          window[in_seven[shift] + x + 7 * y + 49 * z] += total[x + 5 * y + 25 * z];
+    if constexpr (dim == 2)
+      for (int part = 0; part < coarse_size; part += lanes) {
+        const auto moved = picked(&from_five[shift][part], total.data());
+        for (int l = 0; l < lanes; ++l)
+          window[part + l] += moved[l];
+      }
+    else
+      for (int z = 0; z < 5; ++z)
+        for (int y = 0; y < 5; ++y)
+          for (int x = 0; x < 5; ++x)
+            window[in_seven[shift] + x + 7 * y + 49 * z] += total[x + 5 * y + 25 * z];
   }
 
   void slice_coarse() {

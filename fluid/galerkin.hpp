@@ -50,7 +50,7 @@ struct CoarseLevel {
 };
 
 struct CoarseningParams {
-  float prolongation_weight = 0.7f;
+  float prolongation_weight = 0.8f;
   float drop_tolerance = 0.01f; ///< smaller parts of the diagonal are added to it, keeping row sums
 };
 

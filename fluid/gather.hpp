@@ -46,6 +46,33 @@ inline Lanes<float> gathered(const int *index, const float *x) {
   return lanes;
 }
 
+/// lane l: x[index[l]] for indices into the 32 numbers from x on.
+inline Lanes<float> picked(const int *index, const float *x) {
+  Lanes<float> lanes;
+#ifdef __AVX512F__
+  _mm512_storeu_ps(lanes.data(),
+                   _mm512_permutex2var_ps(_mm512_loadu_ps(x), _mm512_loadu_si512(index),
+                                          _mm512_loadu_ps(x + 16)));
+#else
+  for (int l = 0; l < 16; ++l)
+    lanes[l] = x[index[l]];
+#endif
+  return lanes;
+}
+
+/// Bit l tells whether |x[l]| > threshold.
+inline unsigned larger_lanes(const float *x, float threshold) {
+#ifdef __AVX512F__
+  return _mm512_cmp_ps_mask(_mm512_abs_ps(_mm512_loadu_ps(x)), _mm512_set1_ps(threshold),
+                            _CMP_GT_OQ);
+#else
+  unsigned bits = 0;
+  for (int l = 0; l < 16; ++l)
+    bits |= static_cast<unsigned>(x[l] > threshold || x[l] < -threshold) << l;
+  return bits;
+#endif
+}
+
 /// Sum of the lanes, by halves.
 inline float sum_of(const Lanes<float> &lanes) {
 #ifdef __AVX512F__

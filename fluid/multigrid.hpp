@@ -14,7 +14,7 @@ class Multigrid : public Preconditioner {
 public:
   struct Params {
     double smoothing_weight = 0.85;   ///< of the Jacobi steps
-    double prolongation_weight = 0.7; ///< of the Jacobi step that smooths the prolongation
+    double prolongation_weight = 0.8; ///< of the Jacobi step that smooths the prolongation
     double drop_tolerance = 0.01;     ///< coarse entries below this part of the diagonal are lumped
     int coarsening = 3;               ///< cells per direction that make a cell of the next level
     int coarsest_size = 64;           ///< unknowns that are solved directly
@@ -53,7 +53,8 @@ private:
   struct Level {
     int rows = 0;
     std::vector<Cell> cell;    // [rows]
-    std::vector<float> weight; // [rows] of the Jacobi step, 1 for isolated rows
+    std::vector<char> is_isolated; // [rows]
+    std::vector<float> weight;     // [rows] of the Jacobi step, 1 for isolated rows
     std::vector<float> b, x, r;
     CoarseLevel coarser;
   };

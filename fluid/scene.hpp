@@ -25,6 +25,7 @@ struct FluidParams {
   std::string coupled_walls = "move";
   double pressure_tolerance = 1e-8;
   double row_guard = 0.1;
+  double noise_damping = 0.5;
   MotionParams motion;
 
   template <class Reader> void describe(Reader &read) {
@@ -43,6 +44,9 @@ struct FluidParams {
         .one_of({"move", "stay"});
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative").positive();
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
+    read("noise_damping", noise_damping,
+         "decay of velocity modes at the scale of the points, in sqrt(g / spacing)")
+        .at_least(0);
     read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
         .at_least(0);
     read("agitation", motion.agitation, "disturbance of the points per root of strain, in spacings")

@@ -36,12 +36,17 @@ void ScaledMatrix::fill_row(const SparseMatrix &a, int i) {
   const int length = i < rows() ? a.row_start[row + 1] - first : 0;
   const double scale = 1 / a.diagonal(row);
   inverse_diagonal_[row] = scale;
-  for (int k = 0; k < pattern_.width(i); ++k) {
-    const std::size_t at = pattern_.place(i, k);
-    pattern_.column[at] = k < length ? a.column[first + k] : row;
-    value_[at] = k < length ? a.value[first + k] * scale : 0;
-    value_float_[at] = static_cast<float>(value_[at]);
-  }
+  std::size_t at = pattern_.place(i, 0);
+  const auto set = [&](int column, double value) {
+    pattern_.column[at] = column;
+    value_[at] = value;
+    value_float_[at] = static_cast<float>(value);
+    at += SlicedPattern::lanes;
+  };
+  for (int k = 0; k < length; ++k)
+    set(a.column[first + k], a.value[first + k] * scale);
+  for (int k = length; k < pattern_.width(i); ++k)
+    set(row, 0);
 }
 
 } // namespace sluice::fluid

@@ -3,8 +3,10 @@
 
 #include "bridge/base/check.hpp"
 #include "fluid/parallel.hpp"
+#include "fluid/point_noise.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace sluice::fluid {
 
@@ -60,6 +62,10 @@ void FluidSolver::end_step() {
       points.velocity[i] = predicted_[i] - factor * pressure_gradient(i, points, cloud_, problem_,
                                                                       points.pressure);
     });
+    const double rate = params_.noise_damping *
+                        std::sqrt(params_.gravity.norm() / params_.spacing);
+    damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient, rate, dt_,
+                     points.velocity);
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_,
                state.step);
   });
