@@ -19,13 +19,11 @@
 //   bridge.finalize();
 //
 // Fields: "displacement" [m] and "velocity" [m/s], solid -> fluid, mapped consistently (H x);
-// "force", nodal forces [N] (2-D: per metre of depth), fluid -> solid, mapped conservatively (H^T
-// F). All arrays hold dim components per node, node by node, in the order of the mesh given to
-// set_mesh.
+// "force", nodal forces [N] (2-D: per metre of depth), fluid -> solid, conservatively (H^T F).
+// All arrays hold dim components per node, node by node, in the order of the mesh of set_mesh.
 //
 // Scheme: serial, fluid first. Every failure (partner absent, dead, silent, with another case file;
-// data that are not finite; a window that does not converge) throws UserError and tells the
-// partner.
+// data not finite; a window that does not converge) throws UserError and tells the partner.
 #pragma once
 
 #include "bridge/base/config.hpp"

@@ -1,12 +1,10 @@
 // SPDX-License-Identifier: MIT
-// The serial schemes, as the solid's side runs them: residual, convergence, next iterate,
-// predictor.
+// The serial schemes, as the solid's side runs them: convergence, next iterate, predictor.
 //
 // Implicit: the fluid computes forces F^k for the iterate (d^k, v^k), the solid answers (d~, v~).
 // The stacked vector [d ; dt v] is what the accelerator sees. A window is accepted when both hold:
-//   |d~ - d^k| <= displacement_tolerance |d~ - d_n| + 1e-12 extent sqrt(nodes)   (increment, floor
-//   [m]) |F^k - F^{k-1}| <= force_tolerance |F^k| + 1e-12 max |F| of the run          (from
-//   iteration 2 on)
+//   |d~ - d^k|      <= displacement_tolerance |d~ - d_n| + 1e-12 extent sqrt(nodes)
+//   |F^k - F^{k-1}| <= force_tolerance |F^k| + 1e-12 max |F| of the run   (from iteration 2 on)
 // The floors let a structure at rest, or one without load, converge. Accepted are d~ and v~.
 // The next window starts from v_p = v_n + (v_n - v_{n-1}) dt/dt_old (v_0 in the first window) and
 // d_p = d_n + dt (v_n + v_p)/2, which is consistent with v_p and exact for constant acceleration.

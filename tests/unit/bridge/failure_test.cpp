@@ -263,10 +263,13 @@ TEST(Failure, strangers_at_the_door_do_not_disturb_the_run) {
     });
   });
   strangers.join();
-  Participant bridge("solid", piston.config(), folder.path());
-  EXPECT_EQ(run_solid(bridge, piston).size(), 3u);
+  const auto solid_error = error_of([&] {
+    Participant bridge("solid", piston.config(), folder.path());
+    EXPECT_EQ(run_solid(bridge, piston).size(), 3u);
+  });
   fluid.join();
   EXPECT_EQ(fluid_error, "");
+  EXPECT_EQ(solid_error, "");
 }
 
 // ---- addresses ----------------------------------------------------------------------------------

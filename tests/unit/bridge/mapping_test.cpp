@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "bridge/face_tree.hpp"
 #include "bridge/mapping_projection.hpp"
 #include "bridge/participant.hpp"
 #include "bridge/projection.hpp"
@@ -152,24 +153,19 @@ TEST(ProjectionMap, refuses_meshes_of_different_dimension) {
   EXPECT_TRUE(contains(error, "2-dimensional") && contains(error, "3-dimensional")) << error;
 }
 
-TEST(ProjectionMap, agrees_with_the_search_over_all_faces) {
+TEST(FaceTree, agrees_with_the_search_over_all_faces) {
   const InterfaceMesh solid = gate(40, 3, 0.3);
-  std::vector<Vec<2>> cloud;
-  const auto noise = random_values(400, 7, 0.0004);
-  const auto places = gate(60, 5, -0.2).positions;
-  for (std::size_t k = 0; k + 1 < places.size(); k += 2)
-    cloud.push_back({places[k] + noise[k], places[k + 1] + noise[k + 1]});
-  const InterfaceMesh fluid = polyline(cloud);
-  const auto projected = projection_map(fluid, solid).consistent(solid.positions);
-  for (std::size_t k = 0; k < cloud.size(); ++k) {
+  const FaceTree tree(solid);
+  const auto noise = random_values(2000, 7, 0.1);
+  for (std::size_t k = 0; k < noise.size(); k += 2) {
+    const Vec<2> p(0.1 + noise[k], noise[k + 1]);
     double nearest = 1e9;
     for (std::size_t f = 0; f < solid.n_faces(); ++f) {
       const auto a = solid.position(f), b = solid.position(f + 1);
       nearest = std::min(
-          nearest, project_on_segment<2>(cloud[k], {a[0], a[1]}, {b[0], b[1]}).distance_squared);
+          nearest, project_on_segment<2>(p, {a[0], a[1]}, {b[0], b[1]}).distance_squared);
     }
-    const Vec<2> foot(projected[2 * k], projected[2 * k + 1]);
-    EXPECT_NEAR((foot - cloud[k]).norm(), std::sqrt(nearest), 1e-15);
+    EXPECT_NEAR(tree.nearest({p.x(), p.y(), 0}).projection.distance_squared, nearest, 1e-17);
   }
 }
 
