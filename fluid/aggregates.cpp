@@ -39,7 +39,8 @@ void AggregateFinder::find(const UnitDiagonalView &matrix, const std::vector<Cel
   attach_rest(matrix, result);
   result.key_of_row.resize(n);
   for_each_index(n, [&](int i) {
-    result.key_of_row[i] = result.of_row[i] < 0 ? no_cell : key_[result.of_row[i]];
+    result.key_of_row[i] =
+        result.of_row[i] < 0 ? no_cell : short_key_of(result.cell[result.of_row[i]]);
   });
 }
 

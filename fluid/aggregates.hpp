@@ -17,13 +17,21 @@ using Cell = std::array<std::int32_t, 3>;
 /// Cell coordinates packed into one number, 21 bits each: differences of keys are keys of
 /// differences. Cells beyond a million from the origin are taken for that far.
 using CellKey = std::int64_t;
-inline constexpr CellKey no_cell = std::int64_t{1} << 62;
 
 inline CellKey key_of(const Cell &cell) {
   CellKey key = 0;
   for (int d = 2; d >= 0; --d)
     key = (key << 21) + std::clamp(cell[d], -1'000'000, 1'000'000);
   return key;
+}
+
+/// Coordinates modulo 1024, ten bits each: enough to tell cells that are next to each other,
+/// sixteen at a time.
+using ShortKey = std::int32_t;
+inline constexpr ShortKey no_cell = 1 << 30;
+
+inline ShortKey short_key_of(const Cell &cell) {
+  return (cell[0] & 1023) | (cell[1] & 1023) << 10 | (cell[2] & 1023) << 20;
 }
 
 /// A matrix I + O with O in slices and in single precision; a view.
@@ -51,7 +59,7 @@ void find_isolated(const SlicedPattern &pattern, const std::vector<float> &off_d
 /// entries, which dividing by the diagonal solves, and detached pieces in the cell of a larger one.
 struct Aggregates {
   std::vector<int> of_row;               ///< [rows] aggregate or -1
-  std::vector<CellKey> key_of_row;       ///< [rows] cell of the aggregate or no_cell
+  std::vector<ShortKey> key_of_row;      ///< [rows] cell of the aggregate or no_cell
   std::vector<Cell> cell;                ///< [aggregates]
   std::vector<int> member_start, member; ///< rows of each aggregate, ascending
   std::vector<int> place_of_row;         ///< [rows] where a row stands in member, or -1

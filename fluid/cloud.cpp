@@ -46,7 +46,7 @@ void drop_hidden_neighbours(const Points &points, const Walls &walls, Cloud &clo
     const int i = cloud.wall_points[k];
     const Vec<2> &x = points.position[i];
     const auto candidates = cloud.near_segments.near(cloud.grid.cell(x));
-    int *const first = cloud.neighbours.index.data() + cloud.neighbours.start[i];
+    int *const first = cloud.neighbours.first(i);
     int *const last = std::remove_if(first, first + cloud.neighbours.count[i], [&](int j) {
       return is_hidden(walls, candidates, x, points.position[j]);
     });
@@ -117,13 +117,16 @@ void update_cell(int i, Points &points, Cloud &cloud) {
 
 } // namespace
 
-void update_neighbours(Points &points, const Walls &walls, double spacing, Cloud &cloud) {
+void update_walls(Points &points, const Walls &walls, double spacing, Cloud &cloud) {
   cloud.spacing = spacing;
   cloud.radius = kernel_radius_ratio * spacing;
   cloud.grid = grid_over(points, cloud.radius);
   sort_by_cell(points, cloud.grid, cloud.ranges);
-  find_neighbours(points, cloud.grid, cloud.ranges, cloud.radius, cloud.neighbours);
   find_walls(points, walls, cloud);
+}
+
+void update_neighbours(const Points &points, const Walls &walls, Cloud &cloud) {
+  find_neighbours(points, cloud.grid, cloud.ranges, cloud.radius, cloud.neighbours);
   drop_hidden_neighbours(points, walls, cloud);
 }
 

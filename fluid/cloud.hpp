@@ -42,8 +42,11 @@ struct Cloud {
 /// Ratio of kernel radius to spacing.
 inline constexpr double kernel_radius_ratio = 2.6;
 
-/// Sorts the points into cells, finds neighbours and wall projections.
-void update_neighbours(Points &points, const Walls &walls, double spacing, Cloud &cloud);
+/// Sorts the points into cells and projects those near walls on them.
+void update_walls(Points &points, const Walls &walls, double spacing, Cloud &cloud);
+
+/// Neighbour lists of the sorted points, those behind a wall left out.
+void update_neighbours(const Points &points, const Walls &walls, Cloud &cloud);
 
 /// Voronoi cells and point kinds; needs neighbours and projections. A hole counts as air when an
 /// empty circle through the point is larger than `open_ratio` spacings (`close_ratio` for a point

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/galerkin.hpp"
 
-#include "fluid/gather.hpp"
+#include "fluid/lanes.hpp"
 
 #include <bit>
 #include <cmath>
@@ -17,17 +17,17 @@ constexpr int power(int base, int exponent) {
 }
 
 // Each aggregate first collects the values in its window; a row then adds what it weighs of them.
-template <int width>
+template <int parts>
 void prolong_windows(const Transfer &t, const std::vector<float> &coarse, std::vector<float> &x) {
   for_each_index(t.aggregates(), [&](int a) {
-    std::array<Lanes<float>, width / 16> around;
-    for (int part = 0; part < width / 16; ++part)
-      around[part] = gathered(&t.neighbour[a * width + 16 * part], coarse.data());
+    std::array<Floats, parts> around;
+    for (int part = 0; part < parts; ++part)
+      around[part] = gathered(&t.neighbour[(a * parts + part) * 16], coarse.data());
     for (int m = t.member_start[a]; m < t.member_start[a + 1]; ++m) {
-      const float *weight = &t.weight[static_cast<std::size_t>(m) * width];
-      Lanes<float> total{};
-      for (int l = 0; l < width; ++l)
-        total[l % 16] += weight[l] * around[l / 16][l % 16];
+      const float *weight = &t.weight[static_cast<std::size_t>(m) * t.width];
+      Floats total = load(weight) * around[0];
+      for (int part = 1; part < parts; ++part)
+        total += load(weight + 16 * part) * around[part];
       x[t.member[m]] += sum_of(total);
     }
   });
@@ -35,24 +35,23 @@ void prolong_windows(const Transfer &t, const std::vector<float> &coarse, std::v
 
 // The reverse: each aggregate adds up the windows of its rows, then every aggregate takes its share
 // from those around it.
-template <int width>
+template <int parts>
 void restrict_windows(Transfer &t, const std::vector<float> &r, const std::vector<float> &scale,
                       std::vector<float> &coarse) {
   for_each_index(t.aggregates(), [&](int a) {
-    std::array<float, width> total{};
-    for (int m = t.member_start[a]; m < t.member_start[a + 1]; ++m) {
-      const float *weight = &t.weight[static_cast<std::size_t>(m) * width];
-      const float residual = r[t.member[m]];
-      for (int l = 0; l < width; ++l)
-        total[l] += weight[l] * residual;
-    }
-    std::copy(total.begin(), total.end(), &t.partial[static_cast<std::size_t>(a) * width]);
+    std::array<Floats, parts> total{};
+    for (int m = t.member_start[a]; m < t.member_start[a + 1]; ++m)
+      for (int part = 0; part < parts; ++part)
+        total[part] +=
+            r[t.member[m]] * load(&t.weight[static_cast<std::size_t>(m) * t.width + 16 * part]);
+    for (int part = 0; part < parts; ++part)
+      store(total[part], &t.partial[(static_cast<std::size_t>(a) * parts + part) * 16]);
   });
   for_each_index(t.aggregates(), [&](int a) {
-    float total = 0;
-    for (int part = 0; part < width / 16; ++part)
-      total += sum_of(gathered(&t.source[a * width + 16 * part], t.partial.data()));
-    coarse[a] = total * scale[a];
+    Floats total = gathered(&t.source[a * t.width], t.partial.data());
+    for (int part = 1; part < parts; ++part)
+      total += gathered(&t.source[a * t.width + 16 * part], t.partial.data());
+    coarse[a] = sum_of(total) * scale[a];
   });
 }
 
@@ -60,17 +59,17 @@ void restrict_windows(Transfer &t, const std::vector<float> &r, const std::vecto
 
 void Transfer::prolong(const std::vector<float> &coarse, std::vector<float> &x) const {
   if (width == 16)
-    prolong_windows<16>(*this, coarse, x);
+    prolong_windows<1>(*this, coarse, x);
   else
-    prolong_windows<32>(*this, coarse, x);
+    prolong_windows<2>(*this, coarse, x);
 }
 
 void Transfer::restrict(const std::vector<float> &r, const std::vector<float> &scale,
                         std::vector<float> &coarse) {
   if (width == 16)
-    restrict_windows<16>(*this, r, scale, coarse);
+    restrict_windows<1>(*this, r, scale, coarse);
   else
-    restrict_windows<32>(*this, r, scale, coarse);
+    restrict_windows<2>(*this, r, scale, coarse);
 }
 
 // Cells around a given one are numbered by `shift`, 0 .. 3^dim - 1, the first direction fastest.
@@ -80,10 +79,10 @@ void Transfer::restrict(const std::vector<float> &r, const std::vector<float> &s
 template <int dim> class GalerkinProduct::Windows {
 public:
   static constexpr int shifts = power(3, dim);
-  static constexpr int a_p_size = dim == 2 ? 32 : 128; // 25 or 125 places used
-  static constexpr int p_size = a_p_size;              // 13 or 63 places used
+  static constexpr int a_p_size = dim == 2 ? 32 : 128;    // 25 or 125 places used
+  static constexpr int p_size = a_p_size;                 // 13 or 63 places used
   static constexpr int coarse_size = dim == 2 ? 64 : 352; // 49 or 343 places used
-  static constexpr int width = dim == 2 ? 16 : 32; // of the windows kept for the transfers
+  static constexpr int width = dim == 2 ? 16 : 32;        // of the windows kept for the transfers
   static constexpr int centre = shifts / 2, coarse_centre = power(7, dim) / 2;
   static constexpr int lanes = SlicedPattern::lanes;
   // In place of a shift: a column in no aggregate, and one of an aggregate that is not next to the
@@ -104,8 +103,14 @@ public:
   }
 
 private:
-  using CoarseWindow = std::array<float, coarse_size>;
+  using CoarseWindow = std::array<Floats, coarse_size / lanes>;
 
+  template <class Window> static float at(const Window &window, int w) {
+    return window[w / lanes][w % lanes];
+  }
+  template <class Window> static void put(Window &window, int w, float value) {
+    window[w / lanes][w % lanes] = value;
+  }
   static constexpr int coordinate(int shift, int d) { return shift / power(3, d) % 3; }
   // Place of the cell `shift` in a window with `width` cells per direction.
   static constexpr int offset(int shift, int width) {
@@ -135,13 +140,12 @@ private:
   }
   static constexpr auto from_five = places_from_five();
 
-  static std::int8_t shift_between(CellKey from, CellKey to) {
-    constexpr CellKey mask = (1 << 21) - 1, one = 1;
-    const CellKey e = to - from + one + (one << 21) + (dim == 3 ? one << 42 : 0);
-    const CellKey x = e & mask, y = (e >> 21) & mask, z = e >> 42;
-    const bool is_next = x <= 2 && y <= 2 && z >= 0 && z <= (dim == 3 ? 2 : 0);
-    const auto shift = static_cast<std::int8_t>(x + 3 * y + 9 * z);
-    return to == no_cell ? nowhere : is_next ? shift : elsewhere;
+  static Ints shifts_between(const Ints &from, const Ints &to) {
+    const Ints x = (to - from + 1) & 1023;
+    const Ints y = ((to >> 10) - (from >> 10) + 1) & 1023;
+    const Ints z = dim == 3 ? ((to >> 20) - (from >> 20) + 1) & 1023 : Ints{};
+    const Ints shift = (x <= 2) & (y <= 2) & (z <= 2) ? x + 3 * y + 9 * z : Ints{} + elsewhere;
+    return (to & no_cell) != 0 ? Ints{} + nowhere : shift;
   }
   // Key of the step from the middle of a window to a place in it.
   static constexpr CellKey key_of_step(int place, int cells) {
@@ -206,34 +210,38 @@ private:
   void compute_p_of_slice(int slice) {
     const SlicedPattern &pattern = matrix_.pattern;
     const int first = slice * lanes, count = std::min(lanes, matrix_.rows() - first);
-    std::array<CellKey, lanes> from;
+    Ints from;
     for (int lane = 0; lane < lanes; ++lane)
       from[lane] = aggregates_.key_of_row[first + std::min(lane, count - 1)];
-    std::array<std::array<float, lanes>, shifts + 1> sum{}; // the last for entries to nowhere
+    std::array<Floats, shifts> sum{};
     const std::size_t begin = pattern.place(first, 0);
     const std::size_t end = begin + static_cast<std::size_t>(pattern.width(first)) * lanes;
-    for (std::size_t at = begin; at < end; at += lanes)
-      for (int lane = 0; lane < lanes; ++lane) {
-        const CellKey to = aggregates_.key_of_row[pattern.column[at + lane]];
-        const std::int8_t shift = shift_between(from[lane], to);
-        m_.shift_[at + lane] = shift;
-        sum[shift][lane] += matrix_.off_diagonal[at + lane];
-      }
+    for (std::size_t at = begin; at < end; at += lanes) {
+      const Ints shift =
+          shifts_between(from, gathered(&pattern.column[at], aggregates_.key_of_row.data()));
+      store_bytes(shift, &m_.shift_[at]);
+      const Floats value = load(&matrix_.off_diagonal[at]);
+      for (int s = 0; s < shifts; ++s)
+        sum[s] += shift == s ? value : Floats{};
+    }
     for (int lane = 0; lane < count; ++lane)
       store_p(first + lane, [&](int shift) { return sum[shift][lane]; });
   }
 
   template <class Sum> void store_p(int i, Sum &&sum) {
-    std::fill_n(p(i), p_size, 0.0f);
+    std::array<Floats, width / lanes> window{};
+    std::array<Floats, p_size / lanes> spread{};
     const int place = aggregates_.place_of_row[i];
-    if (place < 0)
-      return;
-    float *window = weight(place);
-    std::fill_n(window, width, 0.0f);
-    for (int s = 0; s < shifts; ++s)
-      window[s] = (s == centre) - params_.prolongation_weight * ((s == centre) + sum(s));
-    for (int s = 0; s < shifts; ++s)
-      p(i)[in_five[s]] = window[s];
+    if (place >= 0) {
+      for (int s = 0; s < shifts; ++s)
+        put(window, s, (s == centre) - params_.prolongation_weight * ((s == centre) + sum(s)));
+      for (int s = 0; s < shifts; ++s)
+        put(spread, in_five[s], at(window, s));
+      for (int part = 0; part < width / lanes; ++part)
+        store(window[part], weight(place) + part * lanes);
+    }
+    for (int part = 0; part < p_size / lanes; ++part)
+      store(spread[part], p(i) + part * lanes);
   }
 
   void compute_a_p() {
@@ -245,16 +253,16 @@ private:
   }
 
   void compute_a_p(int i) {
-    std::array<float, a_p_size> total;
-    const float *own = p(i) - in_five[centre];
-    for (int l = 0; l < a_p_size; ++l)
-      total[l] = own[l];
+    std::array<Floats, a_p_size / lanes> total;
+    for (int part = 0; part < a_p_size / lanes; ++part)
+      total[part] = load(p(i) - in_five[centre] + part * lanes);
     for_each_shifted(i, [&](int j, int shift, float value) {
       const float *row = p(j) - in_five[shift];
-      for (int l = 0; l < a_p_size; ++l)
-        total[l] += value * row[l];
+      for (int part = 0; part < a_p_size / lanes; ++part)
+        total[part] += value * load(row + part * lanes);
     });
-    std::copy(total.begin(), total.end(), a_p(i));
+    for (int part = 0; part < a_p_size / lanes; ++part)
+      store(total[part], a_p(i) + part * lanes);
   }
 
   static void set(SlicedFloats &matrix, int i, int k, int column, float value) {
@@ -286,29 +294,27 @@ private:
     m_.row_start_[a] = static_cast<int>(block.column.size());
     const float lumped = keep_large(a, window, block);
     block.length.push_back(static_cast<int>(block.column.size()) - m_.row_start_[a]);
-    const float diagonal = window[coarse_centre] + lumped;
+    const float diagonal = at(window, coarse_centre) + lumped;
     result_.scale[a] = diagonal > vanishing * size ? 1 / diagonal : 0;
   }
 
   // Moves the large off-diagonal entries of a row into the block; returns the sum of the others.
   float keep_large(int a, const CoarseWindow &window, Block &block) const {
-    const float threshold = params_.drop_tolerance * std::abs(window[coarse_centre]);
+    const float threshold = params_.drop_tolerance * std::abs(at(window, coarse_centre));
     const CellKey key = key_of(aggregates_.cell[a]);
-    Lanes<float> small{};
+    Floats small{};
     float homeless = 0; // moved there by an entry that reached too far
-    for (int part = 0; part < coarse_size; part += lanes) {
-      for (int l = 0; l < lanes; ++l)
-        small[l] += std::abs(window[part + l]) > threshold ? 0 : window[part + l];
-      for (unsigned bits = larger_lanes(&window[part], threshold); bits != 0; bits &= bits - 1) {
-        const int w = part + std::countr_zero(bits);
-        if (w == coarse_centre)
-          continue;
+    for (int part = 0; part < coarse_size / lanes; ++part) {
+      const Floats v = window[part];
+      small += (v > threshold) | (v < -threshold) ? Floats{} : v;
+      for (unsigned bits = larger_lanes(v, threshold); bits != 0; bits &= bits - 1) {
+        const int w = part * lanes + std::countr_zero(bits);
         const int column = finder_.aggregate_in(key + coarse_key[w]);
         if (column < 0)
-          homeless += window[w];
-        else {
+          homeless += at(window, w);
+        else if (column != a) {
           block.column.push_back(column);
-          block.value.push_back(window[w]);
+          block.value.push_back(at(window, w));
         }
       }
     }
@@ -317,25 +323,29 @@ private:
 
   // Adds the rows of A P in the cell `shift` of an aggregate, each times its entry of R.
   void add_members(int from, int shift, CoarseWindow &window, float &size) {
-    std::array<float, a_p_size> total{};
+    std::array<Floats, a_p_size / lanes> total{};
     for (int m = aggregates_.member_start[from]; m < aggregates_.member_start[from + 1]; ++m) {
       const float r = weight(m)[shifts - 1 - shift];
       const float *row = a_p(aggregates_.member[m]);
       size += std::abs(r);
-      for (int l = 0; l < a_p_size; ++l)
-        total[l] += r * row[l];
+      for (int part = 0; part < a_p_size / lanes; ++part)
+        total[part] += r * load(row + part * lanes);
     }
+    move_and_add(total, shift, window);
+  }
+
+  static void move_and_add(const std::array<Floats, a_p_size / lanes> &total, int shift,
+                           CoarseWindow &window) {
     if constexpr (dim == 2)
-      for (int part = 0; part < coarse_size; part += lanes) {
-        const auto moved = picked(&from_five[shift][part], total.data());
-        for (int l = 0; l < lanes; ++l)
-          window[part + l] += moved[l];
-      }
+      for (int part = 0; part < coarse_size / lanes; ++part)
+        window[part] += picked(&from_five[shift][part * lanes], total[0], total[1]);
     else
       for (int z = 0; z < 5; ++z)
         for (int y = 0; y < 5; ++y)
-          for (int x = 0; x < 5; ++x)
-            window[in_seven[shift] + x + 7 * y + 49 * z] += total[x + 5 * y + 25 * z];
+          for (int x = 0; x < 5; ++x) {
+            const int w = in_seven[shift] + x + 7 * y + 49 * z, l = x + 5 * y + 25 * z;
+            window[w / lanes][w % lanes] += total[l / lanes][l % lanes];
+          }
   }
 
   void slice_coarse() {

@@ -17,6 +17,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
+#include <array>
 
 namespace sluice::fluid {
 
@@ -32,19 +33,46 @@ inline Basis normal_derivative(const Vec<2> &q, const Vec<2> &n) {
   return {n.x(), n.y(), 2 * q.x() * n.x(), q.x() * n.y() + q.y() * n.x(), 2 * q.y() * n.y()};
 }
 
-/// Moment matrix of the quadratic fit.
+/// Moment matrix of the quadratic fit. Neighbours enter through twelve sums of monomials, since
+/// P P^T holds no others.
 class QuadraticFit {
 public:
-  void add(const Basis &row, double w) { moment_.noalias() += (w * row) * row.transpose(); }
+  /// Value row of a neighbour at q.
+  void add_neighbour(const Vec<2> &q, double w) {
+    const double x = q.x(), y = q.y(), xx = x * x, xy = x * y, yy = y * y;
+    const double wxx = w * xx, wxy = w * xy, wyy = w * yy;
+    sum_[0] += wxx;
+    sum_[1] += wxy;
+    sum_[2] += wyy;
+    sum_[3] += wxx * x;
+    sum_[4] += wxx * y;
+    sum_[5] += wyy * x;
+    sum_[6] += wyy * y;
+    sum_[7] += wxx * xx;
+    sum_[8] += wxx * xy;
+    sum_[9] += wxx * yy;
+    sum_[10] += wyy * xy;
+    sum_[11] += wyy * yy;
+  }
+  /// Any other row.
+  void add_row(const Basis &row, double w) { rows_.noalias() += (w * row) * row.transpose(); }
   /// False when the moment matrix is singular.
   bool factorise() {
-    cholesky_.compute(moment_);
+    const auto &s = sum_;
+    Eigen::Matrix<double, 5, 5> moment;
+    moment << s[0], s[1], s[3], s[4], s[5], //
+        s[1], s[2], s[4], s[5], s[6],       //
+        s[3], s[4], s[7], s[8], s[9],       //
+        s[4], s[5], s[8], s[9], s[10],      //
+        s[5], s[6], s[9], s[10], s[11];
+    cholesky_.compute(moment + rows_);
     return cholesky_.info() == Eigen::Success;
   }
   Basis solve(const Basis &functional) const { return cholesky_.solve(functional); }
 
 private:
-  Eigen::Matrix<double, 5, 5> moment_ = Eigen::Matrix<double, 5, 5>::Zero();
+  std::array<double, 12> sum_{};
+  Eigen::Matrix<double, 5, 5> rows_ = Eigen::Matrix<double, 5, 5>::Zero();
   Eigen::LLT<Eigen::Matrix<double, 5, 5>> cholesky_;
 };
 

@@ -63,20 +63,26 @@ Contact resolve_contact(Vec<2> &x, Vec<2> &u, const Walls &walls,
 
 } // namespace
 
-int keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
-                        const Cloud &cloud) {
+ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
+                                  const Cloud &cloud) {
   const double clearance = params.wall_clearance * cloud.spacing;
   const int n = static_cast<int>(cloud.wall_points.size());
-  return static_cast<int>(sum(n, [&](int k) {
-    const PointWalls &near = cloud.point_walls[k];
-    if (near.count == 0 || near.projection[0].distance >= clearance)
-      return 0.0;
-    const int i = cloud.wall_points[k];
-    const auto candidates = cloud.near_segments.near(cloud.grid.cell(points.position[i]));
-    const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
-                                            candidates, cloud.radius, clearance);
-    return contact.was_behind ? 1.0 : 0.0;
-  }));
+  const auto counts = block_sums<2>(n, [&](IndexRange range) {
+    std::array<double, 2> count{};
+    for (int k = range.begin; k < range.end; ++k) {
+      const PointWalls &near = cloud.point_walls[k];
+      if (near.count == 0 || near.projection[0].distance >= clearance * (1 - 1e-9))
+        continue;
+      const int i = cloud.wall_points[k];
+      const auto candidates = cloud.near_segments.near(cloud.grid.cell(points.position[i]));
+      const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
+                                              candidates, cloud.radius, clearance);
+      count[0] += contact.moved;
+      count[1] += contact.was_behind;
+    }
+    return count;
+  });
+  return {static_cast<int>(counts[0]), static_cast<int>(counts[1])};
 }
 
 void volume_restoring_divergence(const Points &points, const Cloud &cloud,

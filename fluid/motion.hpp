@@ -26,6 +26,11 @@ struct MotionParams {
   double wall_clearance = 0.25;
 };
 
+struct ContactCounts {
+  int moved = 0;    // points that were too close to a wall
+  int put_back = 0; // of these, points that were behind it
+};
+
 /// Advances the points by a step `dt` [s] with the second-order extrapolation of their velocity,
 /// x += dt (3 u^n - u^{n-1}) / 2, which from stage to stage is the trapezoidal rule; then applies
 /// the pending regularisation. (The cloud lives at the stage positions; derived here.)
@@ -33,8 +38,7 @@ void move_points(Points &points, double dt);
 
 /// Puts points that are behind a wall or too close to it back to the clearance and removes their
 /// velocity towards it; between two opposite walls, to the middle. Needs the cloud's projections.
-/// Returns the number of points that were behind a wall.
-int keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
+ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
                         const Cloud &cloud);
 
 /// Divergence that brings the cells back to their volume [1/s], zero at the free surface: the

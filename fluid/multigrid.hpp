@@ -52,7 +52,7 @@ public:
 private:
   struct Level {
     int rows = 0;
-    std::vector<Cell> cell;    // [rows]
+    std::vector<Cell> cell;        // [rows]
     std::vector<char> is_isolated; // [rows]
     std::vector<float> weight;     // [rows] of the Jacobi step, 1 for isolated rows
     std::vector<float> b, x, r;

@@ -90,30 +90,41 @@ void for_each_near(const Vec<2> &x, const Grid &grid, const CellRanges &ranges, 
 
 } // namespace
 
-void find_neighbours(const Points &points, const Grid &grid, const CellRanges &ranges,
-                     double radius, NeighbourLists &lists) {
+namespace {
+
+// Fills all lists; returns the length that the longest would have.
+int fill_lists(const Points &points, const Grid &grid, const CellRanges &ranges, double radius,
+               NeighbourLists &lists) {
   const int n = points.size();
   const double radius2 = radius * radius;
-  lists.start.assign(n + 1, 0);
   lists.count.resize(n);
-  for_each_index(n, [&](int i) {
+  lists.index.resize(static_cast<std::size_t>(n) * lists.capacity);
+  for_each_point(n, [&](int i) {
     const Vec<2> x = points.position[i];
+    int *const list = lists.first(i);
     int count = 0;
-    for_each_near(x, grid, ranges,
-                  [&](int j) { count += (points.position[j] - x).squaredNorm() < radius2; });
-    lists.start[i + 1] = lists.count[i] = count - 1;
-  });
-  for (int i = 0; i < n; ++i)
-    lists.start[i + 1] += lists.start[i];
-  lists.index.resize(lists.start[n]);
-  for_each_index(n, [&](int i) {
-    const Vec<2> x = points.position[i];
-    int k = lists.start[i];
     for_each_near(x, grid, ranges, [&](int j) {
-      if (j != i && (points.position[j] - x).squaredNorm() < radius2)
-        lists.index[k++] = j;
+      const bool is_near = (points.position[j] - x).squaredNorm() < radius2 && j != i;
+      list[std::min(count, lists.capacity - 1)] = j;
+      count += is_near;
     });
+    lists.count[i] = count;
   });
+  return n > 0 ? *std::max_element(lists.count.begin(), lists.count.end()) : 0;
+}
+
+} // namespace
+
+void find_neighbours(const Points &points, const Grid &grid, const CellRanges &ranges,
+                     double radius, NeighbourLists &lists) {
+  int longest = fill_lists(points, grid, ranges, radius, lists);
+  if (longest >= lists.capacity && lists.capacity < most_neighbours) {
+    lists.capacity = most_neighbours;
+    longest = fill_lists(points, grid, ranges, radius, lists);
+  }
+  if (longest >= lists.capacity)
+    for (int &count : lists.count)
+      count = std::min(count, lists.capacity - 1);
 }
 
 } // namespace sluice::fluid

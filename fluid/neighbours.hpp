@@ -28,15 +28,19 @@ struct CellRanges {
 };
 
 /// Neighbours within the kernel radius, the point itself excluded.
+/// Lists have room for `capacity` entries each, so that one pass fills them.
 struct NeighbourLists {
-  std::vector<int> start; // where the list of a point begins
-  std::vector<int> count; // its length; hidden neighbours have been taken out behind it
-  std::vector<int> index;
+  int capacity = 32;      // entries per point
+  std::vector<int> count; // length of each list
+  std::vector<int> index; // capacity entries per point
 
-  std::span<const int> of(int i) const {
-    return {index.data() + start[i], static_cast<std::size_t>(count[i])};
-  }
+  std::span<const int> of(int i) const { return {first(i), static_cast<std::size_t>(count[i])}; }
+  const int *first(int i) const { return index.data() + static_cast<std::size_t>(i) * capacity; }
+  int *first(int i) { return index.data() + static_cast<std::size_t>(i) * capacity; }
 };
+
+/// Longest list that is kept: of a point with more neighbours (a clump) the first ones stay.
+inline constexpr int most_neighbours = 64;
 
 /// A grid over all points with the given cell size.
 /// Throws UserError when a position is not finite or the points spread over too many cells.

@@ -16,14 +16,22 @@ constexpr double wall_weight = 1.0;
 // Points farther from a wall than this, in spacings, have no row for it: they see enough neighbours.
 constexpr double wall_row_reach = 1.5;
 
-/// All that the row of one point is made from, in scaled coordinates.
+/// A neighbour in scaled coordinates.
+struct Neighbour {
+  int j;
+  Vec<2> q; // r / h
+  double w;
+};
+
+/// All that the row of one point is made from, gathered once.
 struct Stencil {
   int i;
-  double h;                        // kernel radius [m]
-  std::span<const int> neighbours;
-  const PointWalls *walls;         // or nullptr
-  bool open;                       // touches air: no wall holds it, its pressure is not solved for
-  Vec<2> open_side;                // q of the zero of pressure half a spacing outside; 0: at the point
+  double h;                // kernel radius [m]
+  const PointWalls *walls; // or nullptr
+  bool open;               // touches air: no wall holds it, its pressure is not solved for
+  Vec<2> open_side;        // q of the zero of pressure half a spacing outside; 0: at the point
+  int count;
+  std::array<Neighbour, most_neighbours> neighbour;
 };
 
 double reach_of_rows(const Cloud &cloud) { return wall_row_reach * cloud.spacing; }
@@ -42,46 +50,43 @@ template <class Visit> void for_each_wall_row(const Stencil &s, const Cloud &clo
       visit(m, s.walls->projection[m]);
 }
 
-Stencil stencil_of(int i, const Cloud &cloud) {
-  const Vec<2> open_side = 0.5 * cloud.spacing / cloud.radius * cloud.surface_normal[i];
-  return {i,         cloud.radius, cloud.neighbours.of(i), cloud.walls_of(i),
-          cloud.kind[i] != PointKind::interior, open_side};
+void gather(int i, const Points &points, const Cloud &cloud, Stencil &s) {
+  s.i = i;
+  s.h = cloud.radius;
+  s.walls = cloud.walls_of(i);
+  s.open = cloud.kind[i] != PointKind::interior;
+  s.open_side = 0.5 * cloud.spacing / cloud.radius * cloud.surface_normal[i];
+  s.count = 0;
+  const Vec<2> x = points.position[i];
+  const double scale = 1 / s.h;
+  for (const int j : cloud.neighbours.of(i)) {
+    const Vec<2> q = scale * (points.position[j] - x);
+    s.neighbour[s.count++] = {j, q, weight(std::min(q.norm(), 1.0))};
+  }
 }
 
-struct Neighbour {
-  int j;
-  Vec<2> q;
-  double w;
-};
-
-template <class Visit>
-void for_each_neighbour(const Stencil &s, const Points &points, Visit &&visit) {
-  const Vec<2> &x = points.position[s.i];
-  for (const int j : s.neighbours) {
-    const Vec<2> q = (points.position[j] - x) / s.h;
-    visit(Neighbour{j, q, weight(std::min(q.norm(), 1.0))});
-  }
+template <class Visit> void for_each_neighbour(const Stencil &s, Visit &&visit) {
+  for (int k = 0; k < s.count; ++k)
+    visit(s.neighbour[k]);
 }
 
 // --- fits -----------------------------------------------------------------------------------
 
 QuadraticFit quadratic_fit(const Stencil &s, const Points &points, const Cloud &cloud) {
   QuadraticFit fit;
-  for_each_neighbour(s, points,
-                     [&](const Neighbour &n) { fit.add(quadratic_basis(n.q), n.w); });
+  for_each_neighbour(s, [&](const Neighbour &n) { fit.add_neighbour(n.q, n.w); });
   for_each_wall_row(s, cloud, [&](int, const Projection &p) {
     const Vec<2> q = (p.point - points.position[s.i]) / s.h;
-    fit.add(normal_derivative(q, p.normal), wall_weight);
+    fit.add_row(normal_derivative(q, p.normal), wall_weight);
   });
   return fit;
 }
 
 /// Functionals of d/dx, d/dy from the linear fit: with the walls' rows inside, with the zero of
 /// pressure outside at open points. Walls hold no open point: contact does.
-Eigen::Matrix<double, 5, 2> linear_gradient(const Stencil &s, const Points &points,
-                                            const Cloud &cloud) {
+Eigen::Matrix<double, 5, 2> linear_gradient(const Stencil &s, const Cloud &cloud) {
   LinearFit fit;
-  for_each_neighbour(s, points, [&](const Neighbour &n) { fit.add(n.q, n.w); });
+  for_each_neighbour(s, [&](const Neighbour &n) { fit.add(n.q, n.w); });
   if (s.open)
     fit.add(s.open_side, weight(s.open_side.norm()));
   else
@@ -93,20 +98,19 @@ Eigen::Matrix<double, 5, 2> linear_gradient(const Stencil &s, const Points &poin
 }
 
 /// Functionals of d/dx, d/dy for fields known in the fluid only (velocity): no wall rows.
-Mat<2> fluid_gradient(const Stencil &s, const Points &points) {
+Mat<2> fluid_gradient(const Stencil &s) {
   LinearFit fit;
-  for_each_neighbour(s, points, [&](const Neighbour &n) { fit.add(n.q, n.w); });
+  for_each_neighbour(s, [&](const Neighbour &n) { fit.add(n.q, n.w); });
   return (s.open ? fit.limited_inverse() : fit.inverse()) / s.h;
 }
 
 // --- velocity -------------------------------------------------------------------------------
 
 /// Gradient of u* at the point [1/s], g(a, b) = d u_a / d x_b.
-Mat<2> velocity_gradient(const Stencil &s, const Points &points,
-                         std::span<const Vec<2>> velocity,
+Mat<2> velocity_gradient(const Stencil &s, std::span<const Vec<2>> velocity,
                          const Eigen::Matrix<double, 5, 2> &functional) {
   Mat<2> g = Mat<2>::Zero();
-  for_each_neighbour(s, points, [&](const Neighbour &n) {
+  for_each_neighbour(s, [&](const Neighbour &n) {
     const Vec<2> coefficient = n.w * (functional.transpose() * quadratic_basis(n.q));
     g += (velocity[n.j] - velocity[s.i]) * coefficient.transpose();
   });
@@ -131,7 +135,7 @@ bool has_wrong_signs(const Row &row, double guard) {
 void quadratic_row(const Stencil &s, const Points &points, const Cloud &cloud, const Basis &lap,
                    Row &row) {
   std::size_t k = 0;
-  for_each_neighbour(s, points, [&](const Neighbour &n) {
+  for_each_neighbour(s, [&](const Neighbour &n) {
     row.neighbour[k++] = n.w * lap.dot(quadratic_basis(n.q));
   });
   for_each_wall_row(s, cloud, [&](int m, const Projection &p) {
@@ -149,7 +153,7 @@ void renormalised_row(const Stencil &s, const Points &points, const Cloud &cloud
                       const Vec<2> &skew, Row &row) {
   double denominator = 0;
   std::size_t k = 0;
-  for_each_neighbour(s, points, [&](const Neighbour &n) {
+  for_each_neighbour(s, [&](const Neighbour &n) {
     const double a = n.w * (1 - n.q.dot(skew));
     row.neighbour[k++] = a;
     denominator += a * n.q.squaredNorm();
@@ -174,7 +178,7 @@ Vec<2> renormalising_skew(const Stencil &s, const Points &points, const Cloud &c
     fit.add(q, w);
     offset += w * q;
   };
-  for_each_neighbour(s, points, [&](const Neighbour &n) { add(n.q, n.w); });
+  for_each_neighbour(s, [&](const Neighbour &n) { add(n.q, n.w); });
   for_each_wall_row(s, cloud, [&](int, const Projection &p) {
     const Vec<2> q = (p.point - points.position[s.i]) / s.h;
     add(q, weight(std::min(q.norm(), 1.0)));
@@ -205,13 +209,12 @@ RowKind laplacian_row(const Stencil &s, const Points &points, const Cloud &cloud
 /// Row of a surface point: pressure falls linearly to zero at the plane half a spacing outside,
 /// p_i = a D/2 with the slope a fitted to the interior neighbours at depth d_j below the plane:
 /// p_i = D/2 sum w d_j p_j / sum w d_j^2. Exact for hydrostatic pressure; an M-matrix row.
-void surface_row(const Stencil &s, const Points &points, const Cloud &cloud,
-                 std::span<double> entry) {
+void surface_row(const Stencil &s, const Cloud &cloud, std::span<double> entry) {
   const Vec<2> &n = cloud.surface_normal[s.i];
   const double half = 0.5 * cloud.spacing / s.h;
   double denominator = 0;
   std::size_t k = 0;
-  for_each_neighbour(s, points, [&](const Neighbour &m) {
+  for_each_neighbour(s, [&](const Neighbour &m) {
     const double depth = half - n.dot(m.q);
     const bool is_donor = cloud.kind[m.j] == PointKind::interior && depth > half;
     entry[k++] = is_donor ? -half * m.w * depth : 0.0;
@@ -248,7 +251,8 @@ public:
         dt_(dt), problem_(problem) {}
 
   RowKind row(int i) const {
-    const Stencil s = stencil_of(i, cloud_);
+    Stencil s;
+    gather(i, points_, cloud_, s);
     fill_columns(s);
     if (cloud_.kind[i] != PointKind::interior) {
       open_row(s);
@@ -260,20 +264,21 @@ public:
 private:
   std::span<double> off_diagonal(const Stencil &s) const {
     return {problem_.matrix.value.data() + problem_.matrix.row_start[s.i] + 1,
-            s.neighbours.size()};
+            static_cast<std::size_t>(s.count)};
   }
 
   void fill_columns(const Stencil &s) const {
     int *column = problem_.matrix.column.data() + problem_.matrix.row_start[s.i];
     *column = s.i;
-    std::copy(s.neighbours.begin(), s.neighbours.end(), column + 1);
+    for (int k = 0; k < s.count; ++k)
+      column[k + 1] = s.neighbour[k].j;
   }
 
   void open_row(const Stencil &s) const {
     problem_.matrix.value[problem_.matrix.row_start[s.i]] = 1;
     problem_.fluid_source[s.i] = 0;
-    surface_row(s, points_, cloud_, off_diagonal(s));
-    problem_.gradient[s.i] = linear_gradient(s, points_, cloud_);
+    surface_row(s, cloud_, off_diagonal(s));
+    problem_.gradient[s.i] = linear_gradient(s, cloud_);
     update_velocity_gradient(s, linear_functional(s));
     if (s.walls)
       problem_.wall_rows[cloud_.wall_slot[s.i]] = {};
@@ -286,7 +291,7 @@ private:
     const RowKind kind =
         laplacian_row(s, points_, cloud_, regular ? &fit : nullptr, params_.row_guard, row);
     if (kind != RowKind::quadratic)
-      problem_.gradient[s.i] = linear_gradient(s, points_, cloud_);
+      problem_.gradient[s.i] = linear_gradient(s, cloud_);
     bool near_wall = false;
     for_each_wall_row(s, cloud_, [&](int, const Projection &) { near_wall = true; });
     const bool symmetric = kind == RowKind::quadratic && !near_wall;
@@ -308,13 +313,13 @@ private:
 
   Eigen::Matrix<double, 5, 2> linear_functional(const Stencil &s) const {
     Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
-    functional.topRows<2>() = fluid_gradient(s, points_);
+    functional.topRows<2>() = fluid_gradient(s);
     return functional;
   }
 
   void update_velocity_gradient(const Stencil &s,
                                 const Eigen::Matrix<double, 5, 2> &functional) const {
-    problem_.velocity_gradient[s.i] = velocity_gradient(s, points_, velocity_, functional);
+    problem_.velocity_gradient[s.i] = velocity_gradient(s, velocity_, functional);
   }
 
   void update_wall_rows(const Stencil &s, const std::array<double, 3> &laplacian) const {
@@ -448,10 +453,11 @@ void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressurePar
 
 Vec<2> pressure_gradient(int i, const Points &points, const Cloud &cloud,
                          const PressureProblem &problem, std::span<const double> pressure) {
-  const Stencil s = stencil_of(i, cloud);
+  Stencil s;
+  gather(i, points, cloud, s);
   const auto &functional = problem.gradient[i];
   Vec<2> gradient = Vec<2>::Zero();
-  for_each_neighbour(s, points, [&](const Neighbour &n) {
+  for_each_neighbour(s, [&](const Neighbour &n) {
     const double scaled = n.w * (pressure[n.j] - pressure[i]);
     gradient += scaled * (functional.transpose() * quadratic_basis(n.q));
   });

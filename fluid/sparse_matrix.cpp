@@ -36,17 +36,16 @@ void ScaledMatrix::fill_row(const SparseMatrix &a, int i) {
   const int length = i < rows() ? a.row_start[row + 1] - first : 0;
   const double scale = 1 / a.diagonal(row);
   inverse_diagonal_[row] = scale;
-  std::size_t at = pattern_.place(i, 0);
-  const auto set = [&](int column, double value) {
-    pattern_.column[at] = column;
-    value_[at] = value;
-    value_float_[at] = static_cast<float>(value);
-    at += SlicedPattern::lanes;
-  };
-  for (int k = 0; k < length; ++k)
-    set(a.column[first + k], a.value[first + k] * scale);
-  for (int k = length; k < pattern_.width(i); ++k)
-    set(row, 0);
+  const std::size_t at = pattern_.place(i, 0);
+  int *column = &pattern_.column[at];
+  double *value = &value_[at];
+  float *value_float = &value_float_[at];
+  for (int k = 0; k < pattern_.width(i); ++k) {
+    const bool inside = k < length;
+    column[k * SlicedPattern::lanes] = inside ? a.column[first + k] : row;
+    value[k * SlicedPattern::lanes] = inside ? a.value[first + k] * scale : 0;
+    value_float[k * SlicedPattern::lanes] = static_cast<float>(value[k * SlicedPattern::lanes]);
+  }
 }
 
 } // namespace sluice::fluid

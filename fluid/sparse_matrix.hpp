@@ -5,7 +5,7 @@
 // sorting).
 #pragma once
 
-#include "fluid/gather.hpp"
+#include "fluid/lanes.hpp"
 #include "fluid/parallel.hpp"
 
 #include <iosfwd>

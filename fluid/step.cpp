@@ -122,15 +122,16 @@ void FluidSolver::leave_through_outlet() {
 
 void FluidSolver::freeze_cloud() {
   Points &points = state.points;
-  timer("search", [&] {
+  timer("walls", [&] {
     cloud_.spacing = params_.spacing;
     leave_through_outlet();
-    update_neighbours(points, walls, params_.spacing, cloud_);
+    update_walls(points, walls, params_.spacing, cloud_);
+    const ContactCounts contacts = keep_clear_of_walls(points, walls, params_.motion, cloud_);
+    state.wall_returns += contacts.put_back;
+    if (contacts.moved > 0)
+      update_walls(points, walls, params_.spacing, cloud_);
   });
-  timer("walls", [&] {
-    state.wall_returns += keep_clear_of_walls(points, walls, params_.motion, cloud_);
-  });
-  timer("search", [&] { update_neighbours(points, walls, params_.spacing, cloud_); });
+  timer("search", [&] { update_neighbours(points, walls, cloud_); });
   timer("cells", [&] { update_cells(points, cloud_); });
 }
 

@@ -45,7 +45,7 @@ private:
     const Vec<2> x = (1 - t) * walls_.position[s.a] + t * walls_.position[s.b];
     const Vec<2> inward = walls_.normal(s);
     const int first = static_cast<int>(quadrature_.contributions.size());
-    const double nearest = collect(k, x, inward);
+    const double nearest = collect(x, inward);
     const int count = static_cast<int>(quadrature_.contributions.size()) - first;
     const double wet = count > 0 ? wet_fraction(nearest, cloud_.spacing) : 0.0;
     if (wet <= 0) {
@@ -57,13 +57,13 @@ private:
   }
 
   // Adds the points in front of the segment and in sight; returns the distance of the nearest.
-  double collect(int k, const Vec<2> &x, const Vec<2> &inward) {
+  double collect(const Vec<2> &x, const Vec<2> &inward) {
     const double radius = load_radius * cloud_.spacing;
     double nearest = 1e300;
     for_each_point_near(x, [&](int i) {
       const Vec<2> r = points_.position[i] - x;
       const double distance = r.norm();
-      if (distance >= radius || r.dot(inward) <= 0 || is_behind_another_wall(k, x, inward, i))
+      if (distance >= radius || r.dot(inward) <= 0 || is_behind_another_wall(x, inward, i))
         return;
       nearest = std::min(nearest, distance);
       quadrature_.contributions.push_back({i, weight(distance / radius)});
@@ -71,13 +71,12 @@ private:
     return nearest;
   }
 
-  bool is_behind_another_wall(int k, const Vec<2> &x, const Vec<2> &inward, int i) const {
+  bool is_behind_another_wall(const Vec<2> &x, const Vec<2> &inward, int i) const {
     const PointWalls *near = cloud_.walls_of(i);
     if (!near || near->count == 0)
       return false;
     const auto candidates = cloud_.near_segments.near(cloud_.grid.cell(points_.position[i]));
     const double off_wall = 1e-6 * cloud_.spacing;
-    (void)k;
     return is_hidden(walls_, candidates, x + off_wall * inward, points_.position[i]);
   }
 
@@ -112,6 +111,24 @@ private:
 
 } // namespace
 
+namespace {
+
+// From point numbers to feeder numbers.
+void number_feeders(int n_points, WallQuadrature &quadrature) {
+  quadrature.feeders.clear();
+  quadrature.feeder_of_point.assign(n_points, -1);
+  for (WallQuadrature::Contribution &c : quadrature.contributions) {
+    int &feeder = quadrature.feeder_of_point[c.feeder];
+    if (feeder < 0) {
+      feeder = static_cast<int>(quadrature.feeders.size());
+      quadrature.feeders.push_back(c.feeder);
+    }
+    c.feeder = feeder;
+  }
+}
+
+} // namespace
+
 void build_wall_quadrature(const Points &points, const Walls &walls, const Cloud &cloud,
                            WallPart part, WallQuadrature &quadrature) {
   quadrature.samples.clear();
@@ -123,12 +140,17 @@ void build_wall_quadrature(const Points &points, const Walls &walls, const Cloud
   else
     for (int k = 0; k < static_cast<int>(walls.segments.size()); ++k)
       builder.add_segment(k);
+  number_feeders(points.size(), quadrature);
 }
 
 void evaluate_tractions(const Points &points, const Walls &walls, const Cloud &cloud,
                         const PressureProblem &problem, std::span<const double> pressure,
                         double viscosity, const WallQuadrature &quadrature,
                         std::vector<Vec<2>> &traction) {
+  std::vector<Vec<2>> gradient(quadrature.feeders.size());
+  for_each_index(static_cast<int>(gradient.size()), [&](int f) {
+    gradient[f] = pressure_gradient(quadrature.feeders[f], points, cloud, problem, pressure);
+  });
   traction.resize(quadrature.samples.size());
   for_each_index(static_cast<int>(traction.size()), [&](int k) {
     const WallQuadrature::Sample &s = quadrature.samples[k];
@@ -138,10 +160,10 @@ void evaluate_tractions(const Points &points, const Walls &walls, const Cloud &c
     double p = 0;
     Vec<2> shear = Vec<2>::Zero();
     for (int c = s.first; c < s.first + s.count; ++c) {
-      const auto &[i, w] = quadrature.contributions[c];
+      const auto &[feeder, w] = quadrature.contributions[c];
+      const int i = quadrature.feeders[feeder];
       const Vec<2> r = s.position - points.position[i];
-      p += w * (pressure[i] +
-                pressure_gradient(i, points, cloud, problem, pressure).dot(r));
+      p += w * (pressure[i] + gradient[feeder].dot(r));
       const Vec<2> slip = points.velocity[i] - wall_velocity;
       const double distance = std::max(r.dot(s.normal), 0.25 * cloud.spacing);
       shear += w * viscosity / distance * (slip - slip.dot(s.normal) * s.normal);

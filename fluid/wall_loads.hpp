@@ -23,11 +23,13 @@ struct WallQuadrature {
     int first, count; // contributions
   };
   struct Contribution {
-    int point;
+    int feeder;
     double weight; // sum to one per sample
   };
   std::vector<Sample> samples;
-  std::vector<Contribution> contributions;
+  std::vector<Contribution> contributions; // `point` counts in `feeders`
+  std::vector<int> feeders;                // the fluid points that contribute, each once
+  std::vector<int> feeder_of_point;        // -1: none
 };
 
 /// Resultant on part of the walls [N/m, N] per metre of depth, moment about the origin.

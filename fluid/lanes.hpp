@@ -1,11 +1,13 @@
 // SPDX-License-Identifier: MIT
-// Sums of products with gathered operands, sixteen rows at a time. GCC 12 does not vectorise the
-// gather by itself, hence the AVX-512 twin of each loop; both add in the same order, though fused
-// multiply-add may round differently.
+// Sixteen numbers at a time: the width of a slice of a matrix and of the multigrid's windows. GCC
+// 12 does not vectorise gathers by itself, hence an AVX-512 twin of each loop with an index in it;
+// both add in the same order, though fused multiply-add may round differently.
 #pragma once
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
+#include <cstring>
 
 #ifdef __AVX512F__
 // GCC 12 takes the undefined lanes inside its own intrinsics for uninitialised variables (bug
@@ -22,6 +24,25 @@ namespace sluice::fluid {
 /// Sixteen numbers, one per row of a slice.
 template <class Number> using Lanes = std::array<Number, 16>;
 
+/// Sixteen floats to compute with.
+using Floats = float __attribute__((vector_size(64)));
+
+/// Sixteen integers to compute with.
+using Ints = int __attribute__((vector_size(64)));
+
+inline Floats load(const float *x) {
+  Floats v;
+  std::memcpy(&v, x, sizeof v);
+  return v;
+}
+/// The lanes as bytes; they must be in [-128, 127].
+inline void store_bytes(const Ints &v, std::int8_t *x) {
+  using Bytes = std::int8_t __attribute__((vector_size(16)));
+  const auto bytes = __builtin_convertvector(v, Bytes);
+  std::memcpy(x, &bytes, sizeof bytes);
+}
+inline void store(const Floats &v, float *x) { std::memcpy(x, &v, sizeof v); }
+
 /// lane l: sum over k < width of value[16 k + l] * x[column[16 k + l]].
 template <class Number, class Value, class X>
 Lanes<Number> gathered_sums(const Value *value, const int *column, int width, const X *x) {
@@ -33,52 +54,61 @@ Lanes<Number> gathered_sums(const Value *value, const int *column, int width, co
 }
 
 /// lane l: x[index[l]], or zero where the index is negative.
-inline Lanes<float> gathered(const int *index, const float *x) {
-  Lanes<float> lanes;
+inline Floats gathered(const int *index, const float *x) {
 #ifdef __AVX512F__
   const __m512i at = _mm512_loadu_si512(index);
   const __mmask16 is_there = _mm512_cmpge_epi32_mask(at, _mm512_setzero_si512());
-  _mm512_storeu_ps(lanes.data(), _mm512_mask_i32gather_ps(_mm512_setzero_ps(), is_there, at, x, 4));
+  return _mm512_mask_i32gather_ps(_mm512_setzero_ps(), is_there, at, x, 4);
 #else
+  Floats v;
   for (int l = 0; l < 16; ++l)
-    lanes[l] = index[l] < 0 ? 0 : x[index[l]];
+    v[l] = index[l] < 0 ? 0 : x[index[l]];
+  return v;
 #endif
-  return lanes;
 }
 
-/// lane l: x[index[l]] for indices into the 32 numbers from x on.
-inline Lanes<float> picked(const int *index, const float *x) {
-  Lanes<float> lanes;
+/// lane l: x[index[l]].
+inline Ints gathered(const int *index, const int *x) {
 #ifdef __AVX512F__
-  _mm512_storeu_ps(lanes.data(),
-                   _mm512_permutex2var_ps(_mm512_loadu_ps(x), _mm512_loadu_si512(index),
-                                          _mm512_loadu_ps(x + 16)));
+  return (Ints)_mm512_i32gather_epi32(_mm512_loadu_si512(index), x, 4);
 #else
+  Ints v;
   for (int l = 0; l < 16; ++l)
-    lanes[l] = x[index[l]];
+    v[l] = x[index[l]];
+  return v;
 #endif
-  return lanes;
 }
 
-/// Bit l tells whether |x[l]| > threshold.
-inline unsigned larger_lanes(const float *x, float threshold) {
+/// lane l: lane index[l] of two vectors laid end to end.
+inline Floats picked(const int *index, const Floats &first, const Floats &second) {
 #ifdef __AVX512F__
-  return _mm512_cmp_ps_mask(_mm512_abs_ps(_mm512_loadu_ps(x)), _mm512_set1_ps(threshold),
-                            _CMP_GT_OQ);
+  return _mm512_permutex2var_ps(first, _mm512_loadu_si512(index), second);
+#else
+  Floats v;
+  for (int l = 0; l < 16; ++l)
+    v[l] = index[l] < 16 ? first[index[l]] : second[index[l] - 16];
+  return v;
+#endif
+}
+
+/// Bit l tells whether |v[l]| > threshold.
+inline unsigned larger_lanes(const Floats &v, float threshold) {
+#ifdef __AVX512F__
+  return _mm512_cmp_ps_mask(_mm512_abs_ps(v), _mm512_set1_ps(threshold), _CMP_GT_OQ);
 #else
   unsigned bits = 0;
   for (int l = 0; l < 16; ++l)
-    bits |= static_cast<unsigned>(x[l] > threshold || x[l] < -threshold) << l;
+    bits |= static_cast<unsigned>(v[l] > threshold || v[l] < -threshold) << l;
   return bits;
 #endif
 }
 
 /// Sum of the lanes, by halves.
-inline float sum_of(const Lanes<float> &lanes) {
+inline float sum_of(const Floats &lanes) {
 #ifdef __AVX512F__
-  return _mm512_reduce_add_ps(_mm512_loadu_ps(lanes.data()));
+  return _mm512_reduce_add_ps(lanes);
 #else
-  Lanes<float> v = lanes;
+  Floats v = lanes;
   for (int half = 8; half > 0; half /= 2)
     for (int l = 0; l < half; ++l)
       v[l] += v[l + half];
