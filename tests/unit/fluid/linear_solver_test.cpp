@@ -145,13 +145,14 @@ TEST(LinearSolver, pieces_that_do_not_touch_are_solved_together) {
   const auto pool = make_cloud<2>({.points = {40, 40}});
   const auto drop = make_cloud<2>({.points = {5, 4}, .top = Top::algebraic});
   auto cells = pool.cell;
-  for (const double offset : {0.0, 1e5}) // in the pool's own cells, then far away
+  // One drop in cells that the pool fills, where only the smoother reaches it, and one far away.
+  for (const int offset : {0, 100'000})
     for (Cell cell : drop.cell) {
-      cell[0] += static_cast<int>(offset);
+      cell[0] += offset;
       cells.push_back(cell);
     }
   const auto matrix = block_diagonal(block_diagonal(pool.matrix, drop.matrix), drop.matrix);
-  EXPECT_LE(iterations(matrix, cells), 8);
+  EXPECT_LE(iterations(matrix, cells), 10);
 }
 
 TEST(LinearSolver, isolated_rows_are_solved_exactly_and_slow_nothing_down) {

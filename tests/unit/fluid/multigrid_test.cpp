@@ -16,17 +16,21 @@ using Dense = Eigen::MatrixXd;
 // One step of coarsening of a cloud, everything kept.
 template <int dim> struct Step {
   ScaledMatrix matrix;
+  std::vector<char> is_isolated;
   Aggregates aggregates;
   CoarseLevel level;
 
   Step(const Cloud<dim> &cloud, double cell_size, const CoarseningParams &params) {
     matrix.build(cloud.matrix);
+    find_isolated(matrix.pattern(), matrix.off_diagonal_float(), is_isolated);
     const auto cells = cells_of<dim>(cloud.position, cell_size);
     AggregateFinder finder;
     finder.find(view(), cells, aggregates);
     GalerkinProduct().build(dim, view(), aggregates, finder, params, level);
   }
-  UnitDiagonalView view() const { return {matrix.pattern(), matrix.off_diagonal_float()}; }
+  UnitDiagonalView view() const {
+    return {matrix.pattern(), matrix.off_diagonal_float(), is_isolated};
+  }
 };
 
 Dense dense(const UnitDiagonalView &matrix) {
@@ -58,7 +62,8 @@ Dense columns_of_prolongation(const Transfer &transfer, int rows) {
 
 Dense coarse_matrix(const CoarseLevel &level) {
   const int n = level.transfer.aggregates();
-  Dense a = dense({level.off_diagonal.pattern, level.off_diagonal.value});
+  const std::vector<char> is_isolated;
+  Dense a = dense({level.off_diagonal.pattern, level.off_diagonal.value, is_isolated});
   for (int i = 0; i < n; ++i)
     a.row(i) /= level.scale[i];
   return a;
@@ -117,6 +122,23 @@ TEST(Multigrid, entries_beyond_the_next_cell_keep_the_row_sums_of_the_coarse_mat
   EXPECT_NEAR((coarse_matrix(step.level) * ones).sum(), (p.transpose() * fine_sums).sum(), 1e-3);
 }
 
+TEST(Multigrid, rows_without_neighbours_are_solved_by_one_cycle) {
+  SparseMatrix a;
+  for (int i = 0; i < 200; ++i) {
+    a.column.push_back(i);
+    a.value.push_back(3);
+    a.row_start.push_back(i + 1);
+  }
+  ScaledMatrix matrix;
+  matrix.build(a);
+  Multigrid multigrid;
+  multigrid.build(matrix, std::vector<Cell>(200, Cell{}));
+  const std::vector<double> r(200, 0.5);
+  std::vector<float> z(200);
+  multigrid.apply(r, z);
+  EXPECT_EQ(z, std::vector<float>(200, 0.5f));
+}
+
 // A chain of rows, each coupled to the next; `cut` removes one link.
 SparseMatrix chain(int n, int cut) {
   SparseMatrix a;
@@ -139,7 +161,9 @@ TEST(Aggregates, a_cell_cut_by_a_wall_gives_its_smaller_part_to_the_cell_it_is_c
   const std::vector<Cell> cells{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 0, 0},
                                 {1, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 0, 0}};
   Aggregates aggregates;
-  AggregateFinder().find({matrix.pattern(), matrix.off_diagonal_float()}, cells, aggregates);
+  const std::vector<char> is_isolated(8, 0);
+  AggregateFinder().find({matrix.pattern(), matrix.off_diagonal_float(), is_isolated}, cells,
+                         aggregates);
   EXPECT_EQ(aggregates.of_row, (std::vector<int>{0, 0, 0, 1, 1, 2, 2, 2}));
 }
 
@@ -149,7 +173,8 @@ TEST(Aggregates, negative_cells_and_far_away_ones_are_cells_like_others) {
   const std::vector<Cell> cells{{-1, -1, 0}, {-2, -1, 0}, {900'000, -5, 0}, {900'000, -4, 0}};
   Aggregates aggregates;
   AggregateFinder finder;
-  finder.find({matrix.pattern(), matrix.off_diagonal_float()}, cells, aggregates);
+  const std::vector<char> is_isolated(4, 0);
+  finder.find({matrix.pattern(), matrix.off_diagonal_float(), is_isolated}, cells, aggregates);
   EXPECT_EQ(aggregates.of_row, (std::vector<int>{0, 1, 2, 3}));
   EXPECT_EQ(finder.aggregate_in(key_of({900'000, -5, 0}) + key_of({0, 1, 0})), 3);
   EXPECT_EQ(finder.aggregate_in(key_of({0, 0, 0})), -1);
