@@ -88,7 +88,8 @@ void History::update_extremes(const FluidSolver &solver, const Integrals &now) {
 void History::record(const FluidSolver &solver, std::span<const Vec<2>> increment, double time) {
   record_loads(solver, increment, time);
   const Integrals now = integrate(solver);
-  const Vec<2> wall_force = force_on_all_walls(solver);
+  const Vec<2> wall_force =
+      force_on_all_walls(solver) - solver.report().contact_impulse / solver.dt();
   outlet_energy_ = solver.outlet_energy();
   update_extremes(solver, now);
   const double spacing = solver.params().spacing;

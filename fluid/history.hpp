@@ -30,7 +30,7 @@ public:
 private:
   void record_loads(const FluidSolver &solver, std::span<const Vec<2>> increment, double time);
   void write_fields(const FluidSolver &solver, double time);
-  Vec<2> force_on_all_walls(const FluidSolver &solver);
+  Vec<2> force_on_all_walls(const FluidSolver &solver); // without contact [N/m]
   void update_extremes(const FluidSolver &solver, const Integrals &now);
 
   std::filesystem::path folder_;
@@ -44,9 +44,8 @@ private:
   // running sums
   double work_on_walls_ = 0, outlet_energy_ = 0, last_time_ = 0;
   Integrals start_, last_;
-  Vec<2> last_force_{0, 0};
   long guarded_rows_ = 0, steps_ = 0, pressure_iterations_ = 0, pressure_solves_ = 0;
-  double volume_drift_max_ = 0, energy_gain_max_ = -1e300, momentum_error_max_ = 0;
+  double volume_drift_max_ = 0, energy_gain_max_ = -1e300;
   double initial_volume_ = 0;
   WallQuadrature all_walls_;
   std::vector<Vec<2>> all_tractions_;

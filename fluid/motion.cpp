@@ -67,22 +67,26 @@ ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const Moti
                                   const Cloud &cloud) {
   const double clearance = params.wall_clearance * cloud.spacing;
   const int n = static_cast<int>(cloud.wall_points.size());
-  const auto counts = block_sums<2>(n, [&](IndexRange range) {
-    std::array<double, 2> count{};
+  const auto sums = block_sums<4>(n, [&](IndexRange range) {
+    std::array<double, 4> part{};
     for (int k = range.begin; k < range.end; ++k) {
       const PointWalls &near = cloud.point_walls[k];
       if (near.count == 0 || near.projection[0].distance >= clearance * (1 - 1e-9))
         continue;
       const int i = cloud.wall_points[k];
       const auto candidates = cloud.near_segments.near(cloud.grid.cell(points.position[i]));
+      const Vec<2> before = points.velocity[i];
       const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
                                               candidates, cloud.radius, clearance);
-      count[0] += contact.moved;
-      count[1] += contact.was_behind;
+      const Vec<2> change = points.velocity[i] - before;
+      part[0] += contact.moved;
+      part[1] += contact.was_behind;
+      part[2] += change.x();
+      part[3] += change.y();
     }
-    return count;
+    return part;
   });
-  return {static_cast<int>(counts[0]), static_cast<int>(counts[1])};
+  return {static_cast<int>(sums[0]), static_cast<int>(sums[1]), {sums[2], sums[3]}};
 }
 
 void volume_restoring_divergence(const Points &points, const Cloud &cloud,

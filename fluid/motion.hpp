@@ -29,6 +29,7 @@ struct MotionParams {
 struct ContactCounts {
   int moved = 0;    // points that were too close to a wall
   int put_back = 0; // of these, points that were behind it
+  Vec<2> velocity_change{0, 0}; // sum over the points [m/s]
 };
 
 /// Advances the points by a step `dt` [s] with the second-order extrapolation of their velocity,

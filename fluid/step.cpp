@@ -128,6 +128,8 @@ void FluidSolver::freeze_cloud() {
     update_walls(points, walls, params_.spacing, cloud_);
     const ContactCounts contacts = keep_clear_of_walls(points, walls, params_.motion, cloud_);
     state.wall_returns += contacts.put_back;
+    report_.contact_impulse =
+        params_.density * params_.spacing * params_.spacing * contacts.velocity_change;
     if (contacts.moved > 0)
       update_walls(points, walls, params_.spacing, cloud_);
   });

@@ -23,6 +23,7 @@ struct StepReport {
   int pressure_iterations = 0;  // over all coupling iterations of the step
   int viscous_iterations = 0;
   int pressure_solves = 0;
+  Vec<2> contact_impulse{0, 0}; // of walls on the points that touched them [N s/m]
   int released = 0;             // points that bear no tension next to air
 };
 
