@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/diagnostics.hpp"
+#include "tests/support/fluid_cases.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sluice::fluid {
+namespace {
+
+TEST(CentreLine, OfTheGateRunsFromTheClampToTheTip) {
+  const CentreLine line(testing::scene_of(testing::gate_tank(0.005)).walls);
+  ASSERT_TRUE(line.exists());
+  EXPECT_NEAR((line.tip() - Vec<2>(0.1025, 0)).norm(), 0, 1e-12);
+}
+
+TEST(CentreLine, DoesNotExistWithoutACoupledWall) {
+  EXPECT_FALSE(CentreLine(testing::scene_of(testing::dam_break).walls).exists());
+}
+
+TEST(CentreLine, OfABentGateTellsTheTankFromTheOutside) {
+  Walls walls = testing::scene_of(testing::gate_tank(0.005)).walls;
+  for (const int v :
+       walls.coupled_vertices) { // sheared: 40 mm to the right and 10 mm up at the tip
+    Vec<2> &x = walls.position[v];
+    const double s = (0.079 - x.y()) / 0.079;
+    x += s * Vec<2>(0.04, 0.01);
+  }
+  const CentreLine line(walls);
+  EXPECT_NEAR((line.tip() - Vec<2>(0.1425, 0.01)).norm(), 0, 1e-12);
+  const double middle = 0.1025 + 0.04 * 0.5; // at half height of the gate
+  const double y = 0.5 * (0.079 + 0.01);
+  EXPECT_FALSE(line.is_past({middle - 1e-4, y}));
+  EXPECT_TRUE(line.is_past({middle + 1e-4, y}));
+  EXPECT_FALSE(line.is_past({0.1424, 0.005})); // below the tip
+  EXPECT_TRUE(line.is_past({0.1426, 0.005}));
+  EXPECT_FALSE(line.is_past({0.09, 0.12})); // above the clamp
+  EXPECT_TRUE(line.is_past({0.11, 0.12}));
+}
+
+TEST(WaterLevel, IsTheTopOfTheConnectedColumnAndIgnoresDropsAboveIt) {
+  const double h = 0.1;
+  auto x = testing::lattice(10, 20, h);
+  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h), 2.0, 1e-12);
+  x.emplace_back(0.5, 3.0);
+  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h), 2.0, 1e-12);
+  EXPECT_EQ(water_level(testing::points_at(x), 1.3, h), 0);
+}
+
+TEST(Integrals, OfStillWaterAreItsVolumeAndItsWeightsPotential) {
+  FluidSolver solver(testing::scene_of(testing::gate_tank()));
+  solver.begin_step(1e-4);
+  solver.iterate();
+  solver.end_step();
+  const Integrals total = integrate(solver);
+  EXPECT_NEAR(total.volume, 0.014, 1e-12);
+  EXPECT_NEAR(total.point_volume, 0.014, 1e-12);
+  EXPECT_NEAR(total.tank_volume, 0.014, 1e-12);
+  EXPECT_NEAR(total.potential, 1000 * 9.81 * 0.014 * 0.07, 1e-9);
+  EXPECT_NEAR(total.max_pressure, 1000 * 9.81 * 0.138,
+              1e-3); // lowest row: 2 mm above the floor;
+                     // solved to 1e-8 of 1 kPa, with margin
+}
+
+} // namespace
+} // namespace sluice::fluid
