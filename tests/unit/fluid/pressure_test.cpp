@@ -1,0 +1,266 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/pressure.hpp"
+#include "tests/support/fluid_cases.hpp"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <numbers>
+
+namespace sluice::fluid {
+namespace {
+
+using testing::FrozenCloud;
+
+constexpr double density = 1000, dt = 1e-3;
+
+/// A field and its gradient.
+struct Field {
+  std::function<double(Vec<2>)> value;
+  std::function<Vec<2>(Vec<2>)> gradient;
+};
+
+/// The pressure problem whose exact solution is the field: u* = dt / rho grad p, walls at rest.
+struct Problem {
+  FrozenCloud frozen;
+  PressureParams params;
+  PressureProblem pressure;
+  std::vector<Vec<2>> predicted;
+  std::vector<double> target;
+
+  Problem(FrozenCloud cloud, const std::function<Vec<2>(Vec<2>)> &velocity, double guard = 0.1)
+      : frozen(std::move(cloud)), target(frozen.size(), 0) {
+    params.density = density;
+    params.row_guard = guard;
+    predicted = frozen.values(velocity);
+    assemble_pressure(frozen.points, frozen.cloud, params, predicted, target, dt, pressure);
+    set_wall_velocity(frozen.walls, frozen.cloud, params, dt, pressure);
+  }
+  double row_times(int i, const std::vector<double> &p) const {
+    double total = 0;
+    for (int k = pressure.matrix.row_start[i]; k < pressure.matrix.row_start[i + 1]; ++k)
+      total += pressure.matrix.value[k] * p[pressure.matrix.column[k]];
+    return total;
+  }
+  Vec<2> gradient(int i, const std::vector<double> &p) const {
+    return pressure_gradient(i, frozen.points, frozen.cloud, pressure, p);
+  }
+  /// Laplacian of the row, walls included, where the field's exact source is known.
+  double defect(int i, const std::vector<double> &p) const {
+    return row_times(i, p) - pressure.source[i];
+  }
+};
+
+Problem problem_of(const Field &field, FrozenCloud cloud, double guard = 0.1) {
+  return Problem(
+      std::move(cloud), [&](const Vec<2> &x) { return Vec<2>(dt / density * field.gradient(x)); },
+      guard);
+}
+
+constexpr double no_guard = 1e30;
+constexpr double h = 0.1;
+
+FrozenCloud jittered_box(double jitter = 0.15, unsigned seed = 1) {
+  return FrozenCloud(testing::lattice(12, 10, h, jitter, seed), testing::closed_box(1.2, 1), h);
+}
+
+const Field linear{[](Vec<2> x) { return 3 + 2 * x.x() - 5 * x.y(); },
+                   [](Vec<2>) { return Vec<2>(2, -5); }};
+const Field quadratic{
+    [](Vec<2> x) { return 1 - 2 * x.y() + x.x() * x.x() - 3 * x.x() * x.y() + 2 * x.y() * x.y(); },
+    [](Vec<2> x) { return Vec<2>(2 * x.x() - 3 * x.y(), -2 - 3 * x.x() + 4 * x.y()); }};
+
+TEST(Pressure, GradientOfALinearFieldIsExactOnAJitteredCloudBetweenWalls) {
+  for (const double guard : {no_guard, 0.1, 0.0}) { // with every kind of row
+    const Problem problem = problem_of(linear, jittered_box(), guard);
+    const auto p = problem.frozen.values(linear.value);
+    for (int i = 0; i < problem.frozen.size(); ++i) {
+      EXPECT_NEAR((problem.gradient(i, p) - Vec<2>(2, -5)).norm(), 0, 1e-11);
+    }
+  }
+}
+
+TEST(Pressure, GradientAndRowsAreExactForQuadraticFieldsUpToTheWalls) {
+  const Problem problem = problem_of(quadratic, jittered_box(), no_guard);
+  const auto p = problem.frozen.values(quadratic.value);
+  // u* is linear, so velocity gradients and wall data are exact; condition of the fit: 1e3. Where
+  // the cloud hardly determines the quadratic (a few rows in corners) a linear row takes its place.
+  int exact_rows = 0;
+  for (int i = 0; i < problem.frozen.size(); ++i) {
+    const Vec<2> exact = quadratic.gradient(problem.frozen.points.position[i]);
+    exact_rows +=
+        (problem.gradient(i, p) - exact).norm() < 1e-10 && std::abs(problem.defect(i, p)) < 1e-10;
+  }
+  std::printf("%d of %d rows exact for quadratics\n", exact_rows, problem.frozen.size());
+  EXPECT_GE(exact_rows, problem.pressure.rows.quadratic);
+  EXPECT_GE(problem.pressure.rows.quadratic, 0.9 * problem.frozen.size());
+}
+
+TEST(Pressure, RowsOfTheFallbackAreExactForLinearFields) {
+  // a guard of zero refuses every row with a negative weight
+  const Problem problem = problem_of(linear, jittered_box(0.3), 0.0);
+  EXPECT_GT(problem.pressure.rows.linear + problem.pressure.rows.plain, 0);
+  const FrozenCloud &frozen = problem.frozen;
+  const auto p = frozen.values(linear.value);
+  int checked = 0;
+  for (int i = 0; i < frozen.size(); ++i)
+    if (problem.pressure.rows.plain == 0 || !frozen.cloud.walls_of(i) ||
+        frozen.cloud.walls_of(i)->count == 0) {
+      EXPECT_NEAR(problem.defect(i, p), 0, 1e-10);
+      ++checked;
+    }
+  std::printf("%d rows checked, %d linear, %d plain\n", checked, problem.pressure.rows.linear,
+              problem.pressure.rows.plain);
+}
+
+TEST(Pressure, GradientAndLaplacianConverge) {
+  const double k = std::numbers::pi;
+  const Field wave{[=](Vec<2> x) { return std::sin(k * x.x() + 0.3) * std::cos(k * x.y() + 0.5); },
+                   [=](Vec<2> x) {
+                     return Vec<2>(k * std::cos(k * x.x() + 0.3) * std::cos(k * x.y() + 0.5),
+                                   -k * std::sin(k * x.x() + 0.3) * std::sin(k * x.y() + 0.5));
+                   }};
+  std::vector<double> spacing, gradient_error, laplacian_error;
+  for (const int n : {16, 32, 64}) {
+    const double s = 1.0 / n;
+    const Problem problem = problem_of(
+        wave, FrozenCloud(testing::lattice(n, n, s, 0.2, n), testing::closed_box(1, 1), s));
+    const FrozenCloud &frozen = problem.frozen;
+    const auto p = frozen.values(wave.value);
+    double gradient = 0, laplacian = 0;
+    int count = 0;
+    for (int i = 0; i < frozen.size(); ++i) {
+      const Vec<2> x = frozen.points.position[i];
+      if ((x - Vec<2>(0.5, 0.5)).cwiseAbs().maxCoeff() > 0.3)
+        continue;
+      gradient += (problem.gradient(i, p) - wave.gradient(x)).squaredNorm();
+      const double exact = -2 * k * k * wave.value(x);
+      laplacian += std::pow(-problem.row_times(i, p) / (s * s) - exact, 2);
+      ++count;
+    }
+    spacing.push_back(s);
+    gradient_error.push_back(std::sqrt(gradient / count));
+    laplacian_error.push_back(std::sqrt(laplacian / count));
+    std::printf("n = %2d: gradient %.3e, Laplacian %.3e, rows %d / %d / %d\n", n,
+                gradient_error.back(), laplacian_error.back(), problem.pressure.rows.quadratic,
+                problem.pressure.rows.linear, problem.pressure.rows.plain);
+  }
+  const double gradient_order = testing::fitted_order(spacing, gradient_error);
+  const double laplacian_order = testing::fitted_order(spacing, laplacian_error);
+  std::printf("orders: gradient %.2f, Laplacian %.2f\n", gradient_order, laplacian_order);
+  EXPECT_GE(gradient_order, 1.8);  // quadratic fit: 2, less 0.2
+  EXPECT_GE(laplacian_order, 0.8); // 1, less 0.2
+}
+
+// Largest ratio of negative to positive neighbour weights in the rows of interior points.
+double worst_ratio(const Problem &problem) {
+  double worst = 0;
+  const SparseMatrix &matrix = problem.pressure.matrix;
+  for (int i = 0; i < matrix.rows(); ++i) {
+    double negative = 0, positive = 0;
+    for (int k = matrix.row_start[i] + 1; k < matrix.row_start[i + 1]; ++k)
+      (matrix.value[k] > 0 ? negative : positive) += std::abs(matrix.value[k]);
+    if (positive > 0 || negative > 0)
+      worst = std::max(worst, negative / positive);
+  }
+  return worst;
+}
+
+TEST(Pressure, NoRowHasMoreNegativeWeightThanTheGuardAllows) {
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    const auto cloud = [&] {
+      return FrozenCloud(testing::random_points(150, {1.2, 1}, seed), testing::closed_box(1.2, 1),
+                         h);
+    };
+    const auto at_rest = [](const Vec<2> &) { return Vec<2>(0, 0); };
+    const double guarded = worst_ratio(Problem(cloud(), at_rest));
+    const double unguarded = worst_ratio(Problem(cloud(), at_rest, no_guard));
+    std::printf("random cloud: worst ratio %.3f, %.3f without the guard\n", guarded, unguarded);
+    EXPECT_LE(guarded, 0.1 * (1 + 1e-12));
+    EXPECT_GT(unguarded, 0.2); // the guard has something to do
+  }
+}
+
+TEST(Pressure, DiagonalsArePositiveAndInteriorRowsSumToZero) {
+  const Problem problem(jittered_box(0.3), [](const Vec<2> &) { return Vec<2>(0, 0); });
+  const std::vector<double> ones(problem.frozen.size(), 1.0);
+  for (int i = 0; i < problem.frozen.size(); ++i) {
+    EXPECT_GT(problem.pressure.matrix.diagonal(i), 0);
+    EXPECT_NEAR(problem.row_times(i, ones), 0, 1e-12);
+  }
+}
+
+// --- with the solver ------------------------------------------------------------------------
+
+TEST(PressureSolve, StillWaterHasHydrostaticPressureAndNoAccelerationAtEveryPoint) {
+  FluidSolver solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
+  solver.begin_step(1e-3);
+  solver.iterate();
+  const Points &points = solver.state.points;
+  double worst = 0, worst_force = 0;
+  for (int i = 0; i < points.size(); ++i) {
+    const double exact = 9810 * (0.14 - points.position[i].y());
+    worst = std::max(worst, std::abs(points.pressure[i] - exact));
+    const Vec<2> force =
+        pressure_gradient(i, points, solver.cloud(), solver.problem(), points.pressure) -
+        Vec<2>(0, -9810);
+    worst_force = std::max(worst_force, force.norm());
+  }
+  std::printf("hydrostatic: worst error %.2e Pa of 1373, %.2e Pa/m of 9810\n", worst, worst_force);
+  EXPECT_LT(worst, 1e-6);       // 1e-12 of the source times the number of rows, condition 1e3
+  EXPECT_LT(worst_force, 1e-2); // the same over a spacing, with margin
+}
+
+TEST(PressureSolve, LeavesTheResidualThatItWasAskedFor) {
+  FluidSolver solver(testing::scene_of(testing::dam_break));
+  for (int n = 0; n < 3; ++n) {
+    solver.begin_step(5e-4);
+    solver.iterate();
+    const SparseMatrix &a = solver.problem().matrix;
+    double residual = 0, source = 0;
+    for (int i = 0; i < a.rows(); ++i) {
+      double r = solver.problem().source[i];
+      source += std::pow(r / a.diagonal(i), 2);
+      for (int k = a.row_start[i]; k < a.row_start[i + 1]; ++k)
+        r -= a.value[k] * solver.state.points.pressure[a.column[k]];
+      residual += std::pow(r / a.diagonal(i), 2);
+    }
+    EXPECT_LE(std::sqrt(residual), 1.01e-8 * std::sqrt(source));
+    solver.end_step();
+  }
+}
+
+TEST(PressureSolve, WallVelocityEntersTheRightHandSideAloneAndAffinely) {
+  FluidSolver solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
+  solver.begin_step(1e-3);
+  const auto matrix = solver.problem().matrix.value;
+  const auto fluid_source = solver.problem().fluid_source;
+  std::mt19937 engine(8);
+  std::uniform_real_distribution<double> uniform(-0.1, 0.1);
+  const std::size_t n = solver.walls.velocity.size();
+  std::vector<Vec<2>> zero(n, Vec<2>::Zero()), u1 = zero, u2 = zero, both = zero;
+  for (const int v : solver.walls.coupled_vertices) {
+    u1[v] = {uniform(engine), uniform(engine)};
+    u2[v] = {uniform(engine), uniform(engine)};
+    both[v] = u1[v] + u2[v];
+  }
+  const auto respond = [&](const std::vector<Vec<2>> &u) {
+    solver.walls.velocity = u;
+    solver.iterate();
+    return solver.state.points.pressure;
+  };
+  const auto p0 = respond(zero), p1 = respond(u1), p2 = respond(u2), p12 = respond(both);
+  double size = 0, error = 0;
+  for (std::size_t i = 0; i < p0.size(); ++i) {
+    size = std::max(size, std::abs(p2[i] - p0[i]));
+    error = std::max(error, std::abs((p12[i] - p1[i]) - (p2[i] - p0[i])));
+  }
+  EXPECT_EQ(solver.problem().matrix.value, matrix);
+  EXPECT_EQ(solver.problem().fluid_source, fluid_source);
+  std::printf("affine to %.1e of %.1e Pa\n", error, size);
+  EXPECT_GT(size, 10);
+  EXPECT_LT(error, 1e-8 * size);
+}
+
+} // namespace
+} // namespace sluice::fluid

@@ -1,0 +1,103 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/scene.hpp"
+#include "tests/support/fluid_cases.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sluice::fluid {
+namespace {
+
+using testing::contains;
+using testing::message_of;
+using testing::scene_of;
+
+std::string replaced(std::string text, const std::string &from, const std::string &to) {
+  const auto at = text.find(from);
+  EXPECT_NE(at, std::string::npos) << from;
+  return text.replace(at, from.size(), to);
+}
+
+TEST(Scene, FillsTheWaterWithALatticeHalfASpacingOffTheWalls) {
+  const Scene scene = scene_of(testing::gate_tank());
+  const Points &points = scene.initial.points;
+  ASSERT_EQ(points.size(), 25 * 35);
+  EXPECT_NEAR((points.position[0] - Vec<2>(0.002, 0.002)).norm(), 0, 1e-15);
+  EXPECT_EQ(scene.walls.coupled_vertices.size(), scene.walls.coupled_segments.size() + 1);
+}
+
+TEST(Scene, ATiltedLatticeHoldsNearlyAsManyPoints) {
+  const Scene scene = scene_of(testing::gate_tank(), {"fluid.lattice_angle_deg=10"});
+  EXPECT_NEAR(scene.initial.points.size(), 875, 30); // half a point per spacing of the outline
+}
+
+TEST(Scene, RefusesWaterThatOverlapsAWallWithNameAndPlace) {
+  const std::string text = replaced(testing::gate_tank(), "[0.1, 0.14]", "[0.104, 0.14]");
+  const std::string message =
+      message_of([&] { scene_of(replaced(text, "[0.1, 0], [0.1", "[0.104, 0], [0.1")); });
+  EXPECT_TRUE(contains(message, "overlaps wall 'gate'")) << message;
+  EXPECT_TRUE(contains(message, "(0.102, 0.002) m")) << message;
+  EXPECT_TRUE(contains(message, "0.002 m behind")) << message;
+}
+
+TEST(Scene, RefusesAHoleBelowTheWaterLineWithItsPlace) {
+  const std::string text =
+      replaced(testing::gate_tank(), "[[0, 0.3], [0, 0], [0.8, 0]]", "[[0, 0.3], [0, 0.05]]");
+  const std::string message = message_of([&] { scene_of(text); });
+  EXPECT_TRUE(contains(message, "hole in the walls")) << message;
+  EXPECT_TRUE(contains(message, "0.002")) << message; // the first sample of the open floor
+  EXPECT_NO_THROW(scene_of(text, {"fluid.open_sides=true"}));
+}
+
+TEST(Scene, RefusesAHoleInASideWall) {
+  const std::string text = replaced(testing::gate_tank(), "[[0, 0.3], [0, 0], [0.8, 0]]",
+                                    "[[0, 0.3], [0, 0.08]]\n[[fluid.wall]]\nname = \"rest\"\n"
+                                    "points_m = [[0, 0.06], [0, 0], [0.8, 0]]");
+  const std::string message = message_of([&] { scene_of(text); });
+  EXPECT_TRUE(contains(message, "hole in the walls below the water line at (0, 0.0")) << message;
+}
+
+TEST(Scene, RefusesAMissingKeyByName) {
+  const std::string message =
+      message_of([] { scene_of(replaced(testing::gate_tank(), "spacing_m = 0.004", "")); });
+  EXPECT_TRUE(contains(message, "spacing_m")) << message;
+}
+
+TEST(Scene, RefusesAMisspeltKeyAndNamesTheRightOne) {
+  const std::string message = message_of(
+      [] { scene_of(replaced(testing::gate_tank(), "spacing_m = 0.004", "spacin_m = 0.004")); });
+  EXPECT_TRUE(contains(message, "spacin_m") || contains(message, "spacing_m")) << message;
+  EXPECT_NE(message, "");
+}
+
+TEST(Scene, RefusesASpacingThatLeavesNoWater) {
+  const std::string message =
+      message_of([] { scene_of(testing::dam_break, {"fluid.spacing_m=0.09"}); });
+  EXPECT_TRUE(contains(message, "smaller spacing_m")) << message;
+}
+
+TEST(Scene, RefusesNegativeSpacing) {
+  EXPECT_NE(message_of([] { scene_of(testing::dam_break, {"fluid.spacing_m=-0.01"}); }), "");
+}
+
+TEST(Scene, RefusesASceneWithoutWalls) {
+  const std::string message = message_of([] {
+    scene_of("[fluid]\nspacing_m = 0.1\nopen_sides = true\nwater_m = [[0, 0], [1, 0], [1, 1]]\n");
+  });
+  EXPECT_TRUE(contains(message, "[[fluid.wall]]")) << message;
+}
+
+TEST(Scene, RefusesWallPointsThatCoincide) {
+  const std::string text = replaced(testing::dam_break, "[0.4, 0], [0.4, 0.4]", "[0, 0], [0.4, 0]");
+  const std::string message = message_of([&] { scene_of(text); });
+  EXPECT_TRUE(contains(message, "coincide")) << message;
+}
+
+TEST(Scene, AcceptsAGateThatOverlapsTheFloorByATenthOfAMillimetre) {
+  std::string text = testing::gate_tank();
+  text = replaced(text, "[0.112, 0], [0.1, 0], [0.1, 0.079]",
+                  "[0.112, -0.0001], [0.1, -0.0001], [0.1, 0.079]");
+  EXPECT_EQ(message_of([&] { scene_of(text); }), "");
+}
+
+} // namespace
+} // namespace sluice::fluid

