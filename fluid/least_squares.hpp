@@ -13,11 +13,11 @@
 
 #include "bridge/base/vec.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace sluice::fluid {
 
@@ -56,24 +56,48 @@ public:
   }
   /// Any other row.
   void add_row(const Basis &row, double w) { rows_.noalias() += (w * row) * row.transpose(); }
-  /// False when the moment matrix is singular.
+  /// Cholesky factorisation; false when the moment matrix is not positive definite.
   bool factorise() {
     const auto &s = sum_;
-    Eigen::Matrix<double, 5, 5> moment;
-    moment << s[0], s[1], s[3], s[4], s[5], //
-        s[1], s[2], s[4], s[5], s[6],       //
-        s[3], s[4], s[7], s[8], s[9],       //
-        s[4], s[5], s[8], s[9], s[10],      //
+    lower_ << s[0], 0, 0, 0, 0,        //
+        s[1], s[2], 0, 0, 0,           //
+        s[3], s[4], s[7], 0, 0,        //
+        s[4], s[5], s[8], s[9], 0,     //
         s[5], s[6], s[9], s[10], s[11];
-    cholesky_.compute(moment + rows_);
-    return cholesky_.info() == Eigen::Success;
+    lower_ += rows_;
+    for (int k = 0; k < 5; ++k) {
+      for (int m = 0; m < k; ++m)
+        lower_(k, k) -= lower_(k, m) * lower_(k, m);
+      if (!(lower_(k, k) > 0))
+        return false;
+      lower_(k, k) = 1 / std::sqrt(lower_(k, k)); // the diagonal is kept inverted
+      for (int r = k + 1; r < 5; ++r) {
+        for (int m = 0; m < k; ++m)
+          lower_(r, k) -= lower_(r, m) * lower_(k, m);
+        lower_(r, k) *= lower_(k, k);
+      }
+    }
+    return true;
   }
-  Basis solve(const Basis &functional) const { return cholesky_.solve(functional); }
+  /// A^-1 functional.
+  Basis solve(Basis x) const {
+    for (int k = 0; k < 5; ++k) {
+      for (int m = 0; m < k; ++m)
+        x[k] -= lower_(k, m) * x[m];
+      x[k] *= lower_(k, k);
+    }
+    for (int k = 4; k >= 0; --k) {
+      for (int m = k + 1; m < 5; ++m)
+        x[k] -= lower_(m, k) * x[m];
+      x[k] *= lower_(k, k);
+    }
+    return x;
+  }
 
 private:
   std::array<double, 12> sum_{};
   Eigen::Matrix<double, 5, 5> rows_ = Eigen::Matrix<double, 5, 5>::Zero();
-  Eigen::LLT<Eigen::Matrix<double, 5, 5>> cholesky_;
+  Eigen::Matrix<double, 5, 5> lower_;
 };
 
 /// Second moment of the linear fit, in scaled coordinates q.

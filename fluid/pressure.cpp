@@ -110,9 +110,14 @@ Mat<2> fluid_gradient(const Stencil &s) {
 Mat<2> velocity_gradient(const Stencil &s, std::span<const Vec<2>> velocity,
                          const Eigen::Matrix<double, 5, 2> &functional) {
   Mat<2> g = Mat<2>::Zero();
+  const Vec<2> u = velocity[s.i];
+  const bool is_linear = functional(2, 0) == 0 && functional(3, 0) == 0 && functional(4, 0) == 0;
   for_each_neighbour(s, [&](const Neighbour &n) {
-    const Vec<2> coefficient = n.w * (functional.transpose() * quadratic_basis(n.q));
-    g += (velocity[n.j] - velocity[s.i]) * coefficient.transpose();
+    Vec<2> coefficient = functional.topRows<2>().transpose() * n.q;
+    if (!is_linear)
+      coefficient += functional.bottomRows<3>().transpose() *
+                     Vec<3>(n.q.x() * n.q.x(), n.q.x() * n.q.y(), n.q.y() * n.q.y());
+    g += (n.w * (velocity[n.j] - u)) * coefficient.transpose();
   });
   return g;
 }

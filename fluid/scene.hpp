@@ -23,7 +23,7 @@ struct FluidParams {
   double outlet_x = 1e300;
   bool open_sides = false;
   std::string coupled_walls = "move";
-  double pressure_tolerance = 1e-8;
+  double pressure_tolerance = 1e-7;
   double row_guard = 0.1;
   double noise_damping = 0.5;
   MotionParams motion;

@@ -7,6 +7,7 @@
 
 #include "bridge/base/vec.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -57,7 +58,8 @@ inline void VoronoiCell::cut(const Vec<2> &normal, double offset) {
   }
   if (!any_outside)
     return;
-  const std::array<Vec<2>, capacity> old = corner_;
+  std::array<Vec<2>, capacity> old;
+  std::copy_n(corner_.begin(), size_, old.begin());
   int n = 0;
   double reach2 = 0;
   const auto push = [&](const Vec<2> &x) {
