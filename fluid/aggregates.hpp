@@ -18,7 +18,7 @@ using Cell = std::array<std::int32_t, 3>;
 /// differences. Cells beyond a million from the origin are taken for that far.
 using CellKey = std::int64_t;
 
-inline CellKey key_of(const Cell &cell) {
+constexpr CellKey key_of(const Cell &cell) {
   CellKey key = 0;
   for (int d = 2; d >= 0; --d)
     key = (key << 21) + std::clamp(cell[d], -1'000'000, 1'000'000);

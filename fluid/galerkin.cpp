@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/galerkin.hpp"
 
-#include "fluid/lanes.hpp"
+#include "fluid/cell_windows.hpp"
 
 #include <bit>
 #include <cmath>
@@ -11,10 +11,6 @@ namespace {
 
 // Below this part of what it is summed from, a diagonal is rounding error.
 constexpr float vanishing = 1e-5f;
-
-constexpr int power(int base, int exponent) {
-  return exponent == 0 ? 1 : base * power(base, exponent - 1);
-}
 
 // Each aggregate first collects the values in its window; a row then adds what it weighs of them.
 template <int parts>
@@ -72,23 +68,8 @@ void Transfer::restrict(const std::vector<float> &r, const std::vector<float> &s
     restrict_windows<2>(*this, r, scale, coarse);
 }
 
-// Cells around a given one are numbered by `shift`, 0 .. 3^dim - 1, the first direction fastest.
-// Rows of P and of A P are both laid out with 5 cells per direction, so that moving the first into
-// the second is adding an offset; the zeros behind each row of P are also those in front of the
-// next, so that a row can be read moved.
-template <int dim> class GalerkinProduct::Windows {
+template <int dim> class GalerkinProduct::Windows : CellWindows<dim> {
 public:
-  static constexpr int shifts = power(3, dim);
-  static constexpr int a_p_size = dim == 2 ? 32 : 128;    // 25 or 125 places used
-  static constexpr int p_size = a_p_size;                 // 13 or 63 places used
-  static constexpr int coarse_size = dim == 2 ? 64 : 352; // 49 or 343 places used
-  static constexpr int width = dim == 2 ? 16 : 32;        // of the windows kept for the transfers
-  static constexpr int centre = shifts / 2, coarse_centre = power(7, dim) / 2;
-  static constexpr int lanes = SlicedPattern::lanes;
-  // In place of a shift: a column in no aggregate, and one of an aggregate that is not next to the
-  // row's, for which the row's own is taken.
-  static constexpr std::int8_t nowhere = shifts, elsewhere = centre;
-
   Windows(GalerkinProduct &memory, const UnitDiagonalView &matrix, const Aggregates &aggregates,
           const AggregateFinder &finder, const CoarseningParams &params, CoarseLevel &result)
       : m_(memory), matrix_(matrix), aggregates_(aggregates), finder_(finder), params_(params),
@@ -103,67 +84,13 @@ public:
   }
 
 private:
-  using CoarseWindow = std::array<Floats, coarse_size / lanes>;
+  using Base = CellWindows<dim>;
+  using Base::centre, Base::lanes, Base::shifts, Base::size, Base::width;
+  using typename Base::CoarseWindow, typename Base::Window;
+  static constexpr int parts = size / lanes;
 
-  template <class Window> static float at(const Window &window, int w) {
-    return window[w / lanes][w % lanes];
-  }
-  template <class Window> static void put(Window &window, int w, float value) {
-    window[w / lanes][w % lanes] = value;
-  }
-  static constexpr int coordinate(int shift, int d) { return shift / power(3, d) % 3; }
-  // Place of the cell `shift` in a window with `width` cells per direction.
-  static constexpr int offset(int shift, int width) {
-    int at = 0;
-    for (int d = dim - 1; d >= 0; --d)
-      at = at * width + coordinate(shift, d);
-    return at;
-  }
-  static constexpr std::array<int, shifts> offsets(int width) {
-    std::array<int, shifts> at{};
-    for (int s = 0; s < shifts; ++s)
-      at[s] = offset(s, width);
-    return at;
-  }
-  static constexpr auto in_five = offsets(5), in_seven = offsets(7);
-
-  // For each shift and place in a window of 7 cells per direction, the place in one of 5 that lands
-  // there, or the last place, which is always zero. Plane only.
-  static constexpr auto places_from_five() {
-    std::array<std::array<int, 64>, shifts> from{};
-    for (int s = 0; s < shifts; ++s)
-      for (int w = 0; w < 64; ++w) {
-        const int x = w % 7 - s % 3, y = w / 7 - s / 3;
-        from[s][w] = x >= 0 && x < 5 && y >= 0 && y < 5 ? x + 5 * y : 31;
-      }
-    return from;
-  }
-  static constexpr auto from_five = places_from_five();
-
-  static Ints shifts_between(const Ints &from, const Ints &to) {
-    const Ints x = (to - from + 1) & 1023;
-    const Ints y = ((to >> 10) - (from >> 10) + 1) & 1023;
-    const Ints z = dim == 3 ? ((to >> 20) - (from >> 20) + 1) & 1023 : Ints{};
-    const Ints shift = (x <= 2) & (y <= 2) & (z <= 2) ? x + 3 * y + 9 * z : Ints{} + elsewhere;
-    return (to & no_cell) != 0 ? Ints{} + nowhere : shift;
-  }
-  // Key of the step from the middle of a window to a place in it.
-  static constexpr CellKey key_of_step(int place, int cells) {
-    CellKey key = 0;
-    for (int d = dim - 1; d >= 0; --d)
-      key = (key << 21) + place / power(cells, d) % cells - cells / 2;
-    return key;
-  }
-  static constexpr auto coarse_keys() {
-    std::array<CellKey, power(7, dim)> keys{};
-    for (int w = 0; w < power(7, dim); ++w)
-      keys[w] = key_of_step(w, 7);
-    return keys;
-  }
-  static constexpr auto coarse_key = coarse_keys();
-
-  float *p(int i) { return &m_.p_[(static_cast<std::size_t>(i) + 1) * p_size]; }
-  float *a_p(int i) { return &m_.a_p_[static_cast<std::size_t>(i) * a_p_size]; }
+  float *p(int i) { return &m_.p_[(static_cast<std::size_t>(i) + 1) * size]; }
+  float *a_p(int i) { return &m_.a_p_[static_cast<std::size_t>(i) * size]; }
   float *weight(int m) { return &transfer_.weight[static_cast<std::size_t>(m) * width]; }
   int neighbour(int a, int shift) const { return transfer_.neighbour[a * width + shift]; }
 
@@ -177,7 +104,7 @@ private:
     for_each_index(aggregates_.count(), [&](int a) {
       const CellKey key = key_of(aggregates_.cell[a]);
       for (int s = 0; s < width; ++s) {
-        const int next = s < shifts ? finder_.aggregate_in(key + key_of_step(s, 3)) : -1;
+        const int next = s < shifts ? finder_.aggregate_in(key + Base::key_of_shift(s)) : -1;
         transfer_.neighbour[a * width + s] = next;
         transfer_.source[a * width + s] = next < 0 ? -1 : next * width + shifts - 1 - s;
       }
@@ -190,7 +117,7 @@ private:
     const std::size_t first = pattern.place(i, 0);
     const std::size_t last = first + static_cast<std::size_t>(pattern.width(i)) * pattern.lanes;
     for (std::size_t at = first; at < last; at += pattern.lanes)
-      if (m_.shift_[at] != nowhere)
+      if (m_.shift_[at] != Base::nowhere)
         body(pattern.column[at], m_.shift_[at], matrix_.off_diagonal[at]);
   }
 
@@ -198,8 +125,8 @@ private:
     const int n_slices = matrix_.pattern.slices();
     m_.shift_.resize(matrix_.pattern.stored());
     transfer_.weight.resize(aggregates_.member.size() * width);
-    m_.p_.resize((static_cast<std::size_t>(matrix_.rows()) + 1) * p_size);
-    std::fill_n(m_.p_.begin(), p_size, 0.0f);
+    m_.p_.resize((static_cast<std::size_t>(matrix_.rows()) + 1) * size);
+    std::fill_n(m_.p_.begin(), size, 0.0f);
     for_each_block(n_slices, [&](IndexRange range, int) {
       for (int s = range.begin; s < range.end; ++s)
         compute_p_of_slice(s);
@@ -218,7 +145,7 @@ private:
     const std::size_t end = begin + static_cast<std::size_t>(pattern.width(first)) * lanes;
     for (std::size_t at = begin; at < end; at += lanes) {
       const Ints shift =
-          shifts_between(from, gathered(&pattern.column[at], aggregates_.key_of_row.data()));
+          Base::shifts_between(from, gathered(&pattern.column[at], aggregates_.key_of_row.data()));
       store_bytes(shift, &m_.shift_[at]);
       const Floats value = load(&matrix_.off_diagonal[at]);
       for (int s = 0; s < shifts; ++s)
@@ -230,22 +157,23 @@ private:
 
   template <class Sum> void store_p(int i, Sum &&sum) {
     std::array<Floats, width / lanes> window{};
-    std::array<Floats, p_size / lanes> spread{};
+    Window spread{};
     const int place = aggregates_.place_of_row[i];
     if (place >= 0) {
       for (int s = 0; s < shifts; ++s)
-        put(window, s, (s == centre) - params_.prolongation_weight * ((s == centre) + sum(s)));
+        Base::put(window, s,
+                  (s == centre) - params_.prolongation_weight * ((s == centre) + sum(s)));
       for (int s = 0; s < shifts; ++s)
-        put(spread, in_five[s], at(window, s));
+        Base::put(spread, Base::offset(s), Base::at(window, s));
       for (int part = 0; part < width / lanes; ++part)
         store(window[part], weight(place) + part * lanes);
     }
-    for (int part = 0; part < p_size / lanes; ++part)
+    for (int part = 0; part < parts; ++part)
       store(spread[part], p(i) + part * lanes);
   }
 
   void compute_a_p() {
-    m_.a_p_.resize(static_cast<std::size_t>(matrix_.rows()) * a_p_size);
+    m_.a_p_.resize(static_cast<std::size_t>(matrix_.rows()) * size);
     for_each_index(matrix_.rows(), [&](int i) {
       if (aggregates_.of_row[i] >= 0)
         compute_a_p(i);
@@ -253,15 +181,15 @@ private:
   }
 
   void compute_a_p(int i) {
-    std::array<Floats, a_p_size / lanes> total;
-    for (int part = 0; part < a_p_size / lanes; ++part)
-      total[part] = load(p(i) - in_five[centre] + part * lanes);
+    Window total;
+    for (int part = 0; part < parts; ++part)
+      total[part] = load(p(i) - Base::offset(centre) + part * lanes);
     for_each_shifted(i, [&](int j, int shift, float value) {
-      const float *row = p(j) - in_five[shift];
-      for (int part = 0; part < a_p_size / lanes; ++part)
+      const float *row = p(j) - Base::offset(shift);
+      for (int part = 0; part < parts; ++part)
         total[part] += value * load(row + part * lanes);
     });
-    for (int part = 0; part < a_p_size / lanes; ++part)
+    for (int part = 0; part < parts; ++part)
       store(total[part], a_p(i) + part * lanes);
   }
 
@@ -287,34 +215,35 @@ private:
 
   void compute_coarse_row(int a, Block &block) {
     CoarseWindow window{};
-    float size = 0;
+    float weight_sum = 0;
     for (int s = 0; s < shifts; ++s)
       if (neighbour(a, s) >= 0)
-        add_members(neighbour(a, s), s, window, size);
+        add_members(neighbour(a, s), s, window, weight_sum);
     m_.row_start_[a] = static_cast<int>(block.column.size());
     const float lumped = keep_large(a, window, block);
     block.length.push_back(static_cast<int>(block.column.size()) - m_.row_start_[a]);
-    const float diagonal = at(window, coarse_centre) + lumped;
-    result_.scale[a] = diagonal > vanishing * size ? 1 / diagonal : 0;
+    const float diagonal = Base::at(window, Base::coarse_centre) + lumped;
+    result_.scale[a] = diagonal > vanishing * weight_sum ? 1 / diagonal : 0;
   }
 
   // Moves the large off-diagonal entries of a row into the block; returns the sum of the others.
   float keep_large(int a, const CoarseWindow &window, Block &block) const {
-    const float threshold = params_.drop_tolerance * std::abs(at(window, coarse_centre));
+    const float threshold =
+        params_.drop_tolerance * std::abs(Base::at(window, Base::coarse_centre));
     const CellKey key = key_of(aggregates_.cell[a]);
     Floats small{};
     float homeless = 0; // moved there by an entry that reached too far
-    for (int part = 0; part < coarse_size / lanes; ++part) {
+    for (int part = 0; part < Base::coarse_size / lanes; ++part) {
       const Floats v = window[part];
       small += (v > threshold) | (v < -threshold) ? Floats{} : v;
       for (unsigned bits = larger_lanes(v, threshold); bits != 0; bits &= bits - 1) {
         const int w = part * lanes + std::countr_zero(bits);
-        const int column = finder_.aggregate_in(key + coarse_key[w]);
+        const int column = finder_.aggregate_in(key + Base::key_of_coarse_place(w));
         if (column < 0)
-          homeless += at(window, w);
+          homeless += Base::at(window, w);
         else if (column != a) {
           block.column.push_back(column);
-          block.value.push_back(at(window, w));
+          block.value.push_back(Base::at(window, w));
         }
       }
     }
@@ -322,30 +251,16 @@ private:
   }
 
   // Adds the rows of A P in the cell `shift` of an aggregate, each times its entry of R.
-  void add_members(int from, int shift, CoarseWindow &window, float &size) {
-    std::array<Floats, a_p_size / lanes> total{};
+  void add_members(int from, int shift, CoarseWindow &window, float &weight_sum) {
+    Window total{};
     for (int m = aggregates_.member_start[from]; m < aggregates_.member_start[from + 1]; ++m) {
       const float r = weight(m)[shifts - 1 - shift];
       const float *row = a_p(aggregates_.member[m]);
-      size += std::abs(r);
-      for (int part = 0; part < a_p_size / lanes; ++part)
+      weight_sum += std::abs(r);
+      for (int part = 0; part < parts; ++part)
         total[part] += r * load(row + part * lanes);
     }
-    move_and_add(total, shift, window);
-  }
-
-  static void move_and_add(const std::array<Floats, a_p_size / lanes> &total, int shift,
-                           CoarseWindow &window) {
-    if constexpr (dim == 2)
-      for (int part = 0; part < coarse_size / lanes; ++part)
-        window[part] += picked(&from_five[shift][part * lanes], total[0], total[1]);
-    else
-      for (int z = 0; z < 5; ++z)
-        for (int y = 0; y < 5; ++y)
-          for (int x = 0; x < 5; ++x) {
-            const int w = in_seven[shift] + x + 7 * y + 49 * z, l = x + 5 * y + 25 * z;
-            window[w / lanes][w % lanes] += total[l / lanes][l % lanes];
-          }
+    Base::add_moved(total, shift, window);
   }
 
   void slice_coarse() {
