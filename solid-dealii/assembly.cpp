@@ -87,6 +87,10 @@ Assembly<dim>::Assembly(const Discretisation<dim> &discretisation, Material mate
     constexpr int size = decltype(Condensed<dim, nodes, modes>::recovery)::SizeAtCompileTime;
     recovery_.resize(static_cast<std::size_t>(size * discretisation_.n_cells()));
   });
+  // Taken at rest once: near inversion it grows without limit and would excuse any residual.
+  linearise(Eigen::VectorXd::Zero(discretisation_.n_dofs()),
+            Eigen::VectorXd::Zero(discretisation_.n_modes()));
+  stiffest_at_rest_ = stiffest_;
 }
 
 template <int dim> void Assembly<dim>::number_unknowns(const std::vector<bool> &fixed) {
@@ -240,7 +244,7 @@ double Assembly<dim>::round_off_force(double k, double c,
   const double length =
       displacement.cwiseAbs().maxCoeff() + std::pow(weight_at(discretisation_, 0, 0), 1.0 / dim);
   return 16 * std::numeric_limits<double>::epsilon() *
-         (k * stiffest_ + c * mass_.diagonal().maxCoeff()) * length *
+         (k * stiffest_at_rest_ + c * mass_.diagonal().maxCoeff()) * length *
          std::sqrt(discretisation_.n_cells());
 }
 

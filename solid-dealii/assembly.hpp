@@ -57,7 +57,7 @@ public:
   Eigen::MatrixXd mean_stress(const Eigen::VectorXd &displacement,
                               const Eigen::VectorXd &modes) const;
   /// Force [N] that round-off alone makes where a stiffness k and c times the mass act on
-  /// `displacement`: below it no residual means anything. Valid after linearise.
+  /// `displacement`: below it no residual means anything.
   double round_off_force(double k, double c, const Eigen::VectorXd &displacement) const;
 
   const Discretisation<dim> &discretisation() const { return discretisation_; }
@@ -84,6 +84,7 @@ private:
   std::vector<double> recovery_; // per cell, see Condensed
   double mode_residual_ = 0;
   double stiffest_ = 0; // [N/m] largest diagonal entry of an element before condensation
+  double stiffest_at_rest_ = 0;
 };
 
 } // namespace sluice::solid

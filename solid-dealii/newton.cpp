@@ -54,17 +54,18 @@ template <int dim> Iterate Newton<dim>::increment(const Residual &r) const {
   return step;
 }
 
-// Adds the largest of step, step/2, step/4 ... that inverts no element.
+// Adds the largest of step, step/2, step/4 ... that leaves every element a tenth of the worst det
+// F.
 template <int dim>
 typename Newton<dim>::Residual Newton<dim>::cut_back(const Equation &equation, Iterate &iterate,
-                                                     const Iterate &step) {
+                                                     const Iterate &step, double min_det) {
   const Iterate start = iterate;
   Residual residual;
   for (double factor = 1; factor > 1e-2; factor /= 2) {
     iterate.displacement = start.displacement + factor * step.displacement;
     iterate.modes = start.modes + factor * step.modes;
     residual = evaluate(equation, iterate);
-    if (residual.min_det > 0 && std::isfinite(residual.norm))
+    if (residual.min_det > 0.1 * min_det && std::isfinite(residual.norm))
       break;
   }
   return residual;
@@ -98,7 +99,7 @@ template <int dim> NewtonReport Newton<dim>::solve(const Equation &equation, Ite
       return failed(fmt::format("the tangent is singular after {} iterations (smallest det F "
                                 "{:.3g})",
                                 report.iterations, residual.min_det));
-    residual = cut_back(equation, iterate, increment(residual));
+    residual = cut_back(equation, iterate, increment(residual), residual.min_det);
   }
 }
 

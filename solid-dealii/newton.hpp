@@ -6,10 +6,10 @@
 // k = 1, c = 0 is the static problem; generalised-alpha's step is the same equation with other
 // numbers (time_integrator.hpp). The internal modes follow every update element by element.
 //
-// A step that would invert an element is halved until det F > 0 everywhere. There is no line
-// search on the residual: in a thin body the first full step raises it a thousandfold (a linear
-// deflection stretches the axis) and the next one brings it back, so a descent condition would
-// only crawl. Loads are raised in parts instead (SolidSolver::solve_static).
+// A step that would invert an element, or take nine tenths of its volume, is halved. There is no
+// line search on the residual: in a thin body the first full step raises it a thousandfold (a
+// linear deflection stretches the axis) and the next one brings it back, so a descent condition
+// would only crawl. Loads are raised in parts instead (SolidSolver::solve_static).
 #pragma once
 
 #include "solid-dealii/assembly.hpp"
@@ -65,7 +65,8 @@ private:
   Residual evaluate(const Equation &equation, const Iterate &iterate);
   Iterate increment(const Residual &residual) const;
   bool factorise(const Equation &equation);
-  Residual cut_back(const Equation &equation, Iterate &iterate, const Iterate &step);
+  Residual cut_back(const Equation &equation, Iterate &iterate, const Iterate &step,
+                    double min_det);
   bool is_small(const Residual &residual) const;
 
   Assembly<dim> &assembly_;
