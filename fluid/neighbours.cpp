@@ -70,6 +70,8 @@ void sort_by_cell(Points &points, const Grid &grid, CellRanges &ranges) {
   reorder(points.position, order);
   reorder(points.velocity, order);
   reorder(points.previous_velocity, order);
+  reorder(points.shift, order);
+  reorder(points.shift_velocity, order);
   reorder(points.pressure, order);
   reorder(points.id, order);
   reorder(points.at_surface, order);

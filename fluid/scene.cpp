@@ -18,7 +18,7 @@ void add_leg(Walls &walls, const WallParams &wall, int wall_index, const Vec<2> 
   const Vec<2> from = walls.position[first];
   const double length = (to - from).norm();
   const int pieces = wall.segment_length > 0
-                         ? std::max(1, static_cast<int>(std::lround(length / wall.segment_length)))
+                         ? std::max(1, static_cast<int>(std::ceil(length / wall.segment_length - 1e-9)))
                          : 1;
   for (int k = 1; k <= pieces; ++k) {
     const double t = static_cast<double>(k) / pieces;

@@ -81,6 +81,23 @@ void insert_by_distance(PointWalls &found, const Projection &p) {
     found.projection.back() = p;
 }
 
+// The far face of a plate is behind its near face: not a wall of this point.
+void drop_far_faces(PointWalls &found) {
+  int kept = 0;
+  for (int k = 0; k < found.count; ++k) {
+    const Projection &p = found.projection[k];
+    bool is_far_face = false;
+    for (int m = 0; m < kept; ++m) {
+      const Projection &near = found.projection[m];
+      is_far_face = is_far_face || (p.distance < 0 && near.distance >= 0 &&
+                                    near.normal.dot(p.point - near.point) > 0);
+    }
+    if (!is_far_face)
+      found.projection[kept++] = p;
+  }
+  found.count = kept;
+}
+
 } // namespace
 
 PointWalls project_on_walls(const Walls &walls, std::span<const int> candidates, const Vec<2> &x,
@@ -96,6 +113,7 @@ PointWalls project_on_walls(const Walls &walls, std::span<const int> candidates,
             [](const Projection &p, const Projection &q) {
               return std::abs(p.distance) < std::abs(q.distance);
             });
+  drop_far_faces(found);
   return found;
 }
 
@@ -152,6 +170,18 @@ void find_near_segments(const Walls &walls, const Grid &grid, double reach, Segm
                        [&](int c) { near.segment[next[c]++] = k; });
 }
 
+namespace {
+
+[[noreturn]] void refuse_opposed(const Walls &walls, const WallSegment &s, const WallSegment &t,
+                                 int vertex) {
+  const Vec<2> &x = walls.position[vertex];
+  fail("walls '{}' and '{}' run against each other at ({}, {}) m; reverse the points_m of one: the "
+       "fluid lies on the left of both",
+       walls.names[s.wall], walls.names[t.wall], x.x(), x.y());
+}
+
+} // namespace
+
 void link_outlines(Walls &walls) {
   const int n = static_cast<int>(walls.segments.size());
   const auto coincide = [&](int v, int w) {
@@ -160,6 +190,8 @@ void link_outlines(Walls &walls) {
   for (int k = 0; k < n; ++k)
     for (int m = 0; m < n; ++m) {
       WallSegment &from = walls.segments[k], &to = walls.segments[m];
+      if (k < m && (coincide(from.a, to.a) || coincide(from.b, to.b)))
+        refuse_opposed(walls, from, to, coincide(from.a, to.a) ? from.a : from.b);
       if (k == m || !coincide(from.b, to.a))
         continue;
       const Vec<2> &x = walls.position[from.b];

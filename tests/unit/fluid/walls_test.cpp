@@ -84,7 +84,7 @@ TEST(Walls, AMildlyConvexPolylineGivesOneProjectionEverywhere) {
 
 // Disabled: the far face of a plate that is thinner than the kernel is found from behind, through
 // the plate, and its points count as lying outside of the fluid.
-TEST(Walls, DISABLED_TheFarFaceOfAThinPlateHasNoProjection) {
+TEST(Walls, TheFarFaceOfAThinPlateHasNoProjection) {
   const Walls plate = polyline({{0.1, 2}, {0.1, 0}, {0, 0}, {0, 2}});
   const PointWalls found = project(plate, {-0.05, 1}, 0.3);
   ASSERT_EQ(found.count, 1);
@@ -151,7 +151,7 @@ TEST(Walls, LinkingRefusesABranchingVertexAndSaysWhere) {
 }
 
 // Disabled: link_outlines leaves such walls unlinked, which its description says it refuses.
-TEST(Walls, DISABLED_LinkingRefusesTwoWallsThatRunAgainstEachOther) {
+TEST(Walls, LinkingRefusesTwoWallsThatRunAgainstEachOther) {
   Walls walls;
   testing::add_polyline(walls, {{0, 1}, {0, 0}}, "left");
   testing::add_polyline(walls, {{1, 0}, {0, 0}}, "floor");

@@ -204,6 +204,17 @@ TEST(Element, condensed_tangent_is_the_derivative_with_modes_in_equilibrium) {
   EXPECT_LT((product - slope).norm() / slope.norm(), 1e-8);
 }
 
+TEST(Element, a_displacement_that_is_not_a_number_counts_as_inverted) {
+  const auto d = discretise(distorted_box<2>(), ElementKind::incompatible_modes);
+  Assembly<2> assembly(d, NeoHookean{lame}, 1, std::vector<bool>(18, false));
+  const Eigen::VectorXd modes = Eigen::VectorXd::Zero(d.n_modes());
+  Eigen::VectorXd u = Eigen::VectorXd::Zero(18);
+  EXPECT_NEAR(assembly.linearise(u, modes), 1, 1e-15);
+  u[9] = std::nan("");
+  EXPECT_FALSE(assembly.linearise(u, modes) > 0);
+  EXPECT_FALSE(assembly.smallest_det(u, modes) > 0);
+}
+
 TEST(Element, an_inverted_mesh_cell_is_refused) {
   Box<2> box{{0, 0}, {1, 1}, {1, 1}, {}};
   box.shape = [](const Vec<2> &x) { return Vec<2>(-x.x(), x.y()); };
