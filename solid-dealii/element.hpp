@@ -91,11 +91,10 @@ bool add_point(const Law &law, const Columns<dim, columns> &displacement,
                ElementSystem<dim, columns> &element) {
   const Mat<dim> F = deformation_gradient<dim, columns>(displacement, gradient);
   const double det_f = F.determinant();
-  element.min_det = std::min(element.min_det, det_f);
-  if (!(det_f > 0)) { // also true for NaN
-    element.min_det = std::min(det_f, 0.0);
+  constexpr double lowest = -std::numeric_limits<double>::infinity();
+  element.min_det = std::isnan(det_f) ? lowest : std::min(element.min_det, det_f);
+  if (!(det_f > 0))
     return false;
-  }
   const Columns<dim, columns> g = F.inverse().transpose() * gradient;
   const Response<dim> response = law.template response<dim>(F, det_f);
   element.force += weight * (response.stress * g);
