@@ -6,6 +6,10 @@
 namespace sluice::fluid {
 namespace {
 
+template <class Body> void for_each_row(int n, Body &&body) {
+  for_each_index(n, body, Work::light);
+}
+
 // One solve. Residual vectors are kept divided by `unit_`, the first residual's norm, so that the
 // preconditioner's floats stay far from their limits. With NullSpace::constants every residual is
 // projected along g = D^-1 1, which is the multiplier's column: r - g (1.r) / (1.g); the equations
@@ -49,11 +53,14 @@ private:
 
   // r = D^-1 (b - A x) and its norm.
   void compute_residual() {
-    for_each_block(n_, [&](IndexRange range, int) {
-      matrix_.multiply(x_.data(), range, [&](int i, double product) {
-        m_.r[i] = b_[i] * matrix_.inverse_diagonal(i) - product;
-      });
-    });
+    for_each_block(
+        n_,
+        [&](IndexRange range, int) {
+          matrix_.multiply(x_.data(), range, [&](int i, double product) {
+            m_.r[i] = b_[i] * matrix_.inverse_diagonal(i) - product;
+          });
+        },
+        Work::light);
     if (is_singular())
       result_.multiplier = project(m_.r);
     result_.residual = rms(sum(n_, [&](int i) { return m_.r[i] * m_.r[i]; }));
@@ -62,13 +69,13 @@ private:
   // Removes the multiplier's part from a residual, and returns the multiplier.
   double project(std::vector<double> &r) const {
     const double multiplier = sum(n_, [&](int i) { return r[i]; }) / column_sum_;
-    for_each_index(n_, [&](int i) { r[i] -= multiplier * matrix_.inverse_diagonal(i); });
+    for_each_row(n_, [&](int i) { r[i] -= multiplier * matrix_.inverse_diagonal(i); });
     return multiplier;
   }
 
   void remove_mean() {
     const double mean = sum(n_, [&](int i) { return x_[i]; }) / n_;
-    for_each_index(n_, [&](int i) { x_[i] -= mean; });
+    for_each_row(n_, [&](int i) { x_[i] -= mean; });
   }
 
   // Begins anew from the residual of the present x.
@@ -105,7 +112,7 @@ private:
     if (!is_singular())
       return;
     const float mean = static_cast<float>(sum(n_, [&](int i) { return z[i]; }) / n_);
-    for_each_index(n_, [&](int i) { z[i] -= mean; });
+    for_each_row(n_, [&](int i) { z[i] -= mean; });
   }
 
   // product = D^-1 A z (projected); returns {product . other, product . product}.
@@ -121,9 +128,12 @@ private:
 
   std::array<double, 2> multiply_singular(const std::vector<float> &z, std::vector<double> &product,
                                           const std::vector<double> &other) {
-    for_each_block(n_, [&](IndexRange range, int) {
-      matrix_.multiply(z.data(), range, [&](int i, double value) { product[i] = value; });
-    });
+    for_each_block(
+        n_,
+        [&](IndexRange range, int) {
+          matrix_.multiply(z.data(), range, [&](int i, double value) { product[i] = value; });
+        },
+        Work::light);
     project(product);
     return block_sums<2>(n_, [&](IndexRange range) { return dots(product, other, range); });
   }
@@ -149,7 +159,7 @@ private:
   bool is_small(double r_r) const { return rms(r_r) * unit_ <= 0.9 * target_; }
 
   bool advance_half(double alpha) {
-    for_each_index(n_, [&](int i) { x_[i] += unit_ * alpha * m_.p_hat[i]; });
+    for_each_row(n_, [&](int i) { x_[i] += unit_ * alpha * m_.p_hat[i]; });
     return false;
   }
 
@@ -166,7 +176,7 @@ private:
     const bool broken = !std::isfinite(beta) || beta == 0;
     if (is_small(r_r) || broken || result_.iterations >= options_.max_iterations)
       return false;
-    for_each_index(n_, [&](int i) { m_.p[i] = m_.r[i] + beta * (m_.p[i] - omega * m_.v[i]); });
+    for_each_row(n_, [&](int i) { m_.p[i] = m_.r[i] + beta * (m_.p[i] - omega * m_.v[i]); });
     return true;
   }
 

@@ -126,10 +126,9 @@ Vec<2> push_apart(int i, const Points &points, const Cloud &cloud, double closes
   return push;
 }
 
-// Two numbers in [-1, 1] that depend on the point and the step alone (SplitMix64 by S. Vigna).
-Vec<2> disturbance(std::int32_t id, std::int64_t step) {
-  std::uint64_t z = static_cast<std::uint64_t>(id) * 0x9e3779b97f4a7c15u +
-                    static_cast<std::uint64_t>(step) * 0xd1b54a32d192ed03u;
+// Two numbers in [-1, 1] that depend on the point alone (SplitMix64 by S. Vigna).
+Vec<2> own_direction(std::int32_t id) {
+  std::uint64_t z = (static_cast<std::uint64_t>(id) + 1) * 0x9e3779b97f4a7c15u;
   z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
   z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
   z ^= z >> 31;
@@ -140,16 +139,15 @@ Vec<2> disturbance(std::int32_t id, std::int64_t step) {
 } // namespace
 
 void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
-                std::span<const Mat<2>> velocity_gradient, double dt, std::int64_t step) {
+                std::span<const Mat<2>> velocity_gradient, double dt) {
   const double closest = params.closest_pair * cloud.spacing;
   const double longest = 0.1 * cloud.spacing;
   for_each_point(points.size(), [&](int i) {
     const Mat<2> &g = velocity_gradient[i];
     const double strain_rate = (g + g.transpose()).norm() / std::sqrt(2.0);
     const double strain = std::min(strain_rate * dt, 0.25);
-    Vec<2> shift = params.regularity * strain * cloud.centroid_offset[i] +
-                   params.agitation * std::sqrt(1.5 * strain) * cloud.spacing *
-                       disturbance(points.id[i], step);
+    Vec<2> shift = strain * (params.regularity * cloud.centroid_offset[i] +
+                             params.agitation * cloud.spacing * own_direction(points.id[i]));
     const Vec<2> &n = cloud.surface_normal[i];
     shift -= n.dot(shift) * n;
     if (cloud.kind[i] == PointKind::thin)

@@ -14,9 +14,9 @@ namespace sluice::fluid {
 struct MotionParams {
   /// Fraction of the way to the cell's centroid per unit of strain (dimensionless).
   double regularity = 2.0;
-  /// Root mean square agitation per square root of strain, in spacings (dimensionless). A lattice
-  /// that the flow stretches is a fixed point of the regularisation, though an unstable one;
-  /// without a disturbance it stays a lattice until its rows part.
+  /// Displacement per unit of strain in a direction that is each point's own, in spacings
+  /// (dimensionless). A lattice that the flow stretches is a fixed point of the regularisation,
+  /// though an unstable one; without a disturbance it stays a lattice until its rows part.
   double agitation = 0.05;
   /// Volume errors decay at this multiple of sqrt(g / spacing) (dimensionless).
   double volume_rate = 0.3;
@@ -50,9 +50,8 @@ void volume_restoring_divergence(const Points &points, const Cloud &cloud,
 
 /// Regularisation to be applied in the next move: towards the cell's centroid at a rate
 /// proportional to the local strain rate (along the surface only, at the free surface), and apart
-/// from a neighbour that is too close; plus an agitation, a deterministic function of point and step,
-/// whose variance is proportional to the strain. Zero on a regular cloud and in a fluid at rest.
+/// from a neighbour that is too close; plus an agitation proportional to the strain. Zero on a regular cloud and in a fluid at rest.
 void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
-                std::span<const Mat<2>> velocity_gradient, double dt, std::int64_t step);
+                std::span<const Mat<2>> velocity_gradient, double dt);
 
 } // namespace sluice::fluid

@@ -123,33 +123,35 @@ void Multigrid::eliminate(int pivot, int n) {
 
 void Multigrid::apply(std::span<const double> r, std::span<float> z) {
   Level &fine = level_[0];
-  for_each_index(fine.rows, [&](int i) { fine.b[i] = static_cast<float>(r[i]); });
-  cycle(0);
-  for_each_index(fine.rows, [&](int i) { z[i] = fine.r[i]; });
+  for_each_index(
+      fine.rows, [&](int i) { fine.b[i] = static_cast<float>(r[i]); }, Work::light);
+  cycle(0, z);
 }
 
-// Solves the level's equations for b approximately; the result is in r.
-void Multigrid::cycle(int level) {
+// x = approximate solution of the level's equations for its b.
+void Multigrid::cycle(int level, std::span<float> x) {
   Level &l = level_[level];
   if (level == n_levels_ - 1 && !inverse_.empty())
-    return solve_coarsest();
-  for_each_index(l.rows, [&](int i) { l.x[i] = l.weight[i] * l.b[i]; });
+    return solve_coarsest(x);
+  for_each_index(
+      l.rows, [&](int i) { l.x[i] = l.weight[i] * l.b[i]; }, Work::light);
   if (level + 1 < n_levels_) {
     restrict_residual(level);
-    cycle(level + 1);
-    l.coarser.transfer.prolong(level_[level + 1].r, l.x);
+    std::vector<float> &correction = level_[level + 1].r;
+    cycle(level + 1, correction);
+    l.coarser.transfer.prolong(correction, l.x);
   }
-  smooth(level);
+  smooth(level, x);
 }
 
-void Multigrid::solve_coarsest() {
-  Level &l = level_[n_levels_ - 1];
+void Multigrid::solve_coarsest(std::span<float> x) const {
+  const Level &l = level_[n_levels_ - 1];
   const int n = l.rows;
   for (int i = 0; i < n; ++i) {
     float total = 0;
     for (int j = 0; j < n; ++j)
       total += inverse_[i * n + j] * l.b[j];
-    l.r[i] = total;
+    x[i] = total;
   }
 }
 
@@ -157,21 +159,28 @@ void Multigrid::solve_coarsest() {
 void Multigrid::restrict_residual(int level) {
   Level &l = level_[level];
   const auto matrix = view(level);
-  for_each_block(l.rows, [&](IndexRange range, int) {
-    for_each_product<float>(matrix.pattern, matrix.off_diagonal.data(), l.x.data(), range,
-                            [&](int i, float product) { l.r[i] = l.b[i] - l.x[i] - product; });
-  });
+  for_each_block(
+      l.rows,
+      [&](IndexRange range, int) {
+        for_each_product<float>(matrix.pattern, matrix.off_diagonal.data(), l.x.data(), range,
+                                [&](int i, float product) { l.r[i] = l.b[i] - l.x[i] - product; });
+      },
+      Work::light);
   l.coarser.transfer.restrict(l.r, l.coarser.scale, level_[level + 1].b);
 }
 
-void Multigrid::smooth(int level) {
-  Level &l = level_[level];
+void Multigrid::smooth(int level, std::span<float> x) const {
+  const Level &l = level_[level];
   const auto matrix = view(level);
-  for_each_block(l.rows, [&](IndexRange range, int) {
-    for_each_product<float>(
-        matrix.pattern, matrix.off_diagonal.data(), l.x.data(), range,
-        [&](int i, float product) { l.r[i] = l.x[i] + l.weight[i] * (l.b[i] - l.x[i] - product); });
-  });
+  for_each_block(
+      l.rows,
+      [&](IndexRange range, int) {
+        for_each_product<float>(matrix.pattern, matrix.off_diagonal.data(), l.x.data(), range,
+                                [&](int i, float product) {
+                                  x[i] = l.x[i] + l.weight[i] * (l.b[i] - l.x[i] - product);
+                                });
+      },
+      Work::light);
 }
 
 } // namespace sluice::fluid

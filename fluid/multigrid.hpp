@@ -64,10 +64,10 @@ private:
   void coarsen(int level);
   void invert_coarsest();
   void eliminate(int pivot, int n);
-  void cycle(int level);
-  void solve_coarsest();
+  void cycle(int level, std::span<float> x);
+  void solve_coarsest(std::span<float> x) const;
   void restrict_residual(int level);
-  void smooth(int level);
+  void smooth(int level, std::span<float> x) const;
 
   Params params_;
   const ScaledMatrix *matrix_ = nullptr;

@@ -70,19 +70,27 @@ template <class Body> void for_each_task(int n, bool worthwhile, Body &&body) {
   (void)worthwhile;
 }
 
-/// Calls body(range, b) for each block of [0, n). Short ranges stay on the calling thread, for
-/// which waking another one would take longer than the work.
-template <class Body> void for_each_block(int n, Body &&body) {
+/// How much a loop does per index: some nanoseconds, or some hundred. A loop runs on one thread if
+/// waking another would take longer than the work, and far longer where cores are shared.
+enum class Work { light, heavy };
+
+inline bool is_worth_threads(int n, Work work) { return n > (work == Work::light ? 8192 : 1024); }
+
+/// Calls body(range, b) for each block of [0, n).
+template <class Body> void for_each_block(int n, Body &&body, Work work = Work::heavy) {
   const Blocks blocks(n);
-  for_each_task(blocks.count(), n > 2 * Blocks::smallest, [&](int b) { body(blocks[b], b); });
+  for_each_task(blocks.count(), is_worth_threads(n, work), [&](int b) { body(blocks[b], b); });
 }
 
 /// Calls body(i) for i in [0, n), in any order and in parallel; body writes only what belongs to i.
-template <class Body> void for_each_index(int n, Body &&body) {
-  for_each_block(n, [&](IndexRange range, int) {
-    for (int i = range.begin; i < range.end; ++i)
-      body(i);
-  });
+template <class Body> void for_each_index(int n, Body &&body, Work work = Work::heavy) {
+  for_each_block(
+      n,
+      [&](IndexRange range, int) {
+        for (int i = range.begin; i < range.end; ++i)
+          body(i);
+      },
+      work);
 }
 
 /// for_each_index under the name that the physics uses: once per point of the fluid.
@@ -90,9 +98,11 @@ template <class Body> void for_each_point(int n, Body &&body) { for_each_index(n
 
 /// `K` sums over [0, n) at once: body(range) returns the sums over one block. Same bits for any
 /// number of threads.
-template <int K, class Body> std::array<double, K> block_sums(int n, Body &&body) {
+template <int K, class Body>
+std::array<double, K> block_sums(int n, Body &&body, Work work = Work::light) {
   std::array<std::array<double, K>, Blocks::max_count> partial;
-  for_each_block(n, [&](IndexRange range, int b) { partial[b] = body(range); });
+  for_each_block(
+      n, [&](IndexRange range, int b) { partial[b] = body(range); }, work);
   std::array<double, K> total{};
   for (int b = 0; b < Blocks(n).count(); ++b)
     for (int k = 0; k < K; ++k)
@@ -101,13 +111,16 @@ template <int K, class Body> std::array<double, K> block_sums(int n, Body &&body
 }
 
 /// Sum of term(i) over i in [0, n); same bits for any number of threads.
-template <class Term> double sum(int n, Term &&term) {
-  return block_sums<1>(n, [&](IndexRange range) {
-    double part = 0;
-    for (int i = range.begin; i < range.end; ++i)
-      part += term(i);
-    return std::array<double, 1>{part};
-  })[0];
+template <class Term> double sum(int n, Term &&term, Work work = Work::light) {
+  return block_sums<1>(
+      n,
+      [&](IndexRange range) {
+        double part = 0;
+        for (int i = range.begin; i < range.end; ++i)
+          part += term(i);
+        return std::array<double, 1>{part};
+      },
+      work)[0];
 }
 
 } // namespace sluice::fluid

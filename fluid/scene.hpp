@@ -49,7 +49,7 @@ struct FluidParams {
         .at_least(0);
     read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
         .at_least(0);
-    read("agitation", motion.agitation, "disturbance of the points per root of strain, in spacings")
+    read("agitation", motion.agitation, "disturbance of the points per unit of strain, in spacings")
         .at_least(0);
     read("volume_rate", motion.volume_rate, "decay of volume errors, in sqrt(g / spacing)")
         .at_least(0);

@@ -66,8 +66,7 @@ void FluidSolver::end_step() {
                         std::sqrt(params_.gravity.norm() / params_.spacing);
     damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient, rate, dt_,
                      points.velocity);
-    plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_,
-               state.step);
+    plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
   });
   ++state.step;
 }

@@ -44,7 +44,7 @@ TEST(PlanShift, IsZeroOnALatticeUnderShearFreeFlowAndInAnyFluidAtRest) {
   FrozenCloud regular = tank(), irregular = tank(0.1);
   for (FrozenCloud *frozen : {&regular, &irregular}) {
     const std::vector<Mat<2>> no_gradient(frozen->size(), Mat<2>::Zero());
-    plan_shift(frozen->points, frozen->cloud, {}, no_gradient, 1e-3, 4);
+    plan_shift(frozen->points, frozen->cloud, {}, no_gradient, 1e-3);
     for (int i = 0; i < frozen->size(); ++i) {
       EXPECT_EQ(frozen->points.shift[i].norm(), 0);
       EXPECT_EQ(frozen->points.shift_velocity[i].norm(), 0);
@@ -59,7 +59,7 @@ TEST(PlanShift, PushesAPairApartThatIsCloserThanTheLimitToBothSidesAlike) {
   x[b].x() -= 0.2 * h; // 0.6 spacings apart
   FrozenCloud frozen(x, testing::polyline({{0, 2}, {0, 0}, {1, 0}, {1, 2}}), h);
   const std::vector<Mat<2>> no_gradient(frozen.size(), Mat<2>::Zero());
-  plan_shift(frozen.points, frozen.cloud, {}, no_gradient, 1e-3, 4);
+  plan_shift(frozen.points, frozen.cloud, {}, no_gradient, 1e-3);
   Vec<2> total(0, 0);
   for (int i = 0; i < frozen.size(); ++i) {
     const double expected = frozen.points.id[i] == a   ? -0.05 * h
