@@ -155,6 +155,18 @@ void check_holes(const Scene &scene) {
   }
 }
 
+// Below the highest corner of the water: what is shown at t = 0, and the first guess of the solver.
+std::vector<double> hydrostatic_pressure(const FluidParams &params,
+                                         const std::vector<Vec<2>> &positions) {
+  double at_surface = 1e300;
+  for (const Vec<2> &corner : params.water)
+    at_surface = std::min(at_surface, params.gravity.dot(corner));
+  std::vector<double> pressure;
+  for (const Vec<2> &x : positions)
+    pressure.push_back(params.density * (params.gravity.dot(x) - at_surface));
+  return pressure;
+}
+
 Points fill(const FluidParams &params) {
   Points points;
   points.position =
@@ -166,7 +178,7 @@ Points fill(const FluidParams &params) {
   points.previous_velocity.assign(n, Vec<2>::Zero());
   points.shift.assign(n, Vec<2>::Zero());
   points.shift_velocity.assign(n, Vec<2>::Zero());
-  points.pressure.assign(n, 0);
+  points.pressure = hydrostatic_pressure(params, points.position);
   points.at_surface.assign(n, SurfaceMemory::enclosed);
   points.id.resize(n);
   for (std::size_t i = 0; i < n; ++i)
