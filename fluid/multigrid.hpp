@@ -36,8 +36,9 @@ public:
   /// radius of the stencils are best (2 spacings for a radius of 2.1). Keeps a reference to
   /// `matrix`.
   void build(const ScaledMatrix &matrix, std::span<const Cell> cells);
-  /// After the matrix has changed a little: coarse levels are kept, the finest one is the new
-  /// matrix.
+  /// After the matrix has changed a little, rows still standing for the same points: coarse levels
+  /// are kept, the finest one is the new matrix. Iterations stay the same until points have moved
+  /// by about a tenth of a spacing against each other.
   void update(const ScaledMatrix &matrix);
   /// One V-cycle from zero.
   void apply(std::span<const double> r, std::span<float> z) override;
