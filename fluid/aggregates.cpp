@@ -13,14 +13,18 @@ std::size_t hash(CellKey key) {
 
 } // namespace
 
-void find_isolated(const SlicedPattern &pattern, const std::vector<float> &off_diagonal,
-                   std::vector<char> &is_isolated) {
-  is_isolated.resize(pattern.rows);
-  for_each_index(pattern.rows, [&](int i) {
-    bool isolated = true;
-    for (int k = 0; k < pattern.width(i) && isolated; ++k)
-      isolated = off_diagonal[pattern.place(i, k)] == 0;
-    is_isolated[i] = isolated;
+void sum_magnitudes(const SlicedPattern &pattern, const std::vector<float> &off_diagonal,
+                    std::vector<float> &sum) {
+  sum.resize(pattern.rows);
+  constexpr int lanes = SlicedPattern::lanes;
+  for_each_index(pattern.slices(), [&](int s) {
+    Floats total{};
+    for (int k = pattern.slice_start[s]; k < pattern.slice_start[s + 1]; ++k) {
+      const Floats v = load(&off_diagonal[static_cast<std::size_t>(k) * lanes]);
+      total += v < 0 ? -v : v;
+    }
+    for (int i = s * lanes; i < std::min(pattern.rows, (s + 1) * lanes); ++i)
+      sum[i] = total[i % lanes];
   });
 }
 
@@ -60,7 +64,7 @@ void AggregateFinder::number_cells(const UnitDiagonalView &matrix, const std::ve
   key_.clear();
   result.cell.clear();
   cell_of_.resize(n);
-  for_each_index(n, [&](int i) { cell_of_[i] = matrix.is_isolated[i] ? -1 : 0; });
+  for_each_index(n, [&](int i) { cell_of_[i] = matrix.is_isolated(i) ? -1 : 0; });
   for (int i = 0, last = -1; i < n; ++i) {
     if (cell_of_[i] < 0)
       continue;

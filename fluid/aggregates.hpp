@@ -38,8 +38,9 @@ inline ShortKey short_key_of(const Cell &cell) {
 struct UnitDiagonalView {
   const SlicedPattern &pattern;
   const std::vector<float> &off_diagonal;
-  const std::vector<char> &is_isolated; ///< [rows] whether a row has no off-diagonal entry
+  const std::vector<float> &off_diagonal_sum; ///< [rows] of the magnitudes in a row
 
+  bool is_isolated(int i) const { return off_diagonal_sum[i] == 0; }
   int rows() const { return pattern.rows; }
   /// Calls body(column, value) for the entries of row i of O that are not zero.
   template <class Body> void for_each_entry(int i, Body &&body) const {
@@ -51,9 +52,16 @@ struct UnitDiagonalView {
   }
 };
 
-/// Marks the rows whose entries are all zero.
-void find_isolated(const SlicedPattern &pattern, const std::vector<float> &off_diagonal,
-                   std::vector<char> &is_isolated);
+/// Sums of the magnitudes in every row. One plus the sum bounds what a row can make of a vector.
+void sum_magnitudes(const SlicedPattern &pattern, const std::vector<float> &off_diagonal,
+                    std::vector<float> &sum);
+
+/// Weight of a Jacobi step on a row, `weight` where the off-diagonal magnitudes do not exceed the
+/// diagonal and less beyond: weight (1 + sum) <= 2 * `weight` < 2 keeps the spectrum of the step
+/// within the unit circle whatever the signs (Gershgorin).
+inline float bounded_weight(float weight, float off_diagonal_sum) {
+  return 2 * weight / (1 + std::max(1.0f, off_diagonal_sum));
+}
 
 /// Disjoint sets of rows, one per occupied cell. Rows in none (-1) are those without off-diagonal
 /// entries, which dividing by the diagonal solves, and detached pieces in the cell of a larger one.

@@ -11,6 +11,10 @@ namespace {
 
 // Below this part of what it is summed from, a diagonal is rounding error.
 constexpr float vanishing = 1e-5f;
+// A coarse row whose off-diagonal magnitudes exceed its diagonal this many times belongs to an
+// aggregate that smoothing has all but cancelled, such as a single row at the free surface; healthy
+// rows stay below 4. Without it a correction there is left to the smoother.
+constexpr float degenerate = 8;
 
 // Each aggregate first collects the values in its window; a row then adds what it weighs of them.
 template <int parts>
@@ -160,9 +164,9 @@ private:
     Window spread{};
     const int place = aggregates_.place_of_row[i];
     if (place >= 0) {
+      const float w = bounded_weight(params_.prolongation_weight, matrix_.off_diagonal_sum[i]);
       for (int s = 0; s < shifts; ++s)
-        Base::put(window, s,
-                  (s == centre) - params_.prolongation_weight * ((s == centre) + sum(s)));
+        Base::put(window, s, (s == centre) - w * ((s == centre) + sum(s)));
       for (int s = 0; s < shifts; ++s)
         Base::put(spread, Base::offset(s), Base::at(window, s));
       for (int part = 0; part < width / lanes; ++part)
@@ -223,7 +227,12 @@ private:
     const float lumped = keep_large(a, window, block);
     block.length.push_back(static_cast<int>(block.column.size()) - m_.row_start_[a]);
     const float diagonal = Base::at(window, Base::coarse_centre) + lumped;
-    result_.scale[a] = diagonal > vanishing * weight_sum ? 1 / diagonal : 0;
+    float off_diagonal = 0;
+    for (std::size_t k = m_.row_start_[a]; k < block.value.size(); ++k)
+      off_diagonal += std::abs(block.value[k]);
+    const bool is_sound =
+        diagonal > vanishing * weight_sum && off_diagonal < degenerate * diagonal;
+    result_.scale[a] = is_sound ? 1 / diagonal : 0;
   }
 
   // Moves the large off-diagonal entries of a row into the block; returns the sum of the others.

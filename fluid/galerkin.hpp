@@ -45,7 +45,8 @@ struct Transfer {
 struct CoarseLevel {
   Transfer transfer;
   SlicedFloats off_diagonal; ///< of R A P divided by its diagonal
-  std::vector<float> scale;  ///< 1 / diagonal of R A P; 0 where that vanishes (an enclosed piece)
+  std::vector<float> scale;  ///< 1 / diagonal of R A P; 0 for rows left out: enclosed pieces (the
+                             ///< diagonal vanishes) and cancelled aggregates
   std::size_t entries = 0;   ///< of R A P
 };
 

@@ -31,9 +31,9 @@ double Multigrid::operator_complexity() const {
 
 UnitDiagonalView Multigrid::view(int level) const {
   if (level == 0)
-    return {matrix_->pattern(), matrix_->off_diagonal_float(), level_[0].is_isolated};
+    return {matrix_->pattern(), matrix_->off_diagonal_float(), level_[0].off_diagonal_sum};
   const SlicedFloats &matrix = level_[level - 1].coarser.off_diagonal;
-  return {matrix.pattern, matrix.value, level_[level].is_isolated};
+  return {matrix.pattern, matrix.value, level_[level].off_diagonal_sum};
 }
 
 void Multigrid::build(const ScaledMatrix &matrix, std::span<const Cell> cells) {
@@ -63,9 +63,11 @@ void Multigrid::start_level(int level) {
   const auto matrix = view(level);
   const auto weight = static_cast<float>(params_.smoothing_weight);
   l.rows = matrix.rows();
-  find_isolated(matrix.pattern, matrix.off_diagonal, l.is_isolated);
+  sum_magnitudes(matrix.pattern, matrix.off_diagonal, l.off_diagonal_sum);
   l.weight.resize(l.rows);
-  for_each_index(l.rows, [&](int i) { l.weight[i] = l.is_isolated[i] ? 1 : weight; });
+  for_each_index(l.rows, [&](int i) {
+    l.weight[i] = matrix.is_isolated(i) ? 1 : bounded_weight(weight, l.off_diagonal_sum[i]);
+  });
   for (auto *vector : {&l.b, &l.x, &l.r})
     vector->resize(l.rows);
 }

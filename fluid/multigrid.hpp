@@ -54,7 +54,7 @@ private:
   struct Level {
     int rows = 0;
     std::vector<Cell> cell;        // [rows]
-    std::vector<char> is_isolated; // [rows]
+    std::vector<float> off_diagonal_sum; // [rows] of magnitudes
     std::vector<float> weight;     // [rows] of the Jacobi step, 1 for isolated rows
     std::vector<float> b, x, r;
     CoarseLevel coarser;

@@ -16,20 +16,20 @@ using Dense = Eigen::MatrixXd;
 // One step of coarsening of a cloud, everything kept.
 template <int dim> struct Step {
   ScaledMatrix matrix;
-  std::vector<char> is_isolated;
+  std::vector<float> off_diagonal_sum;
   Aggregates aggregates;
   CoarseLevel level;
 
   Step(const Cloud<dim> &cloud, double cell_size, const CoarseningParams &params) {
     matrix.build(cloud.matrix);
-    find_isolated(matrix.pattern(), matrix.off_diagonal_float(), is_isolated);
+    sum_magnitudes(matrix.pattern(), matrix.off_diagonal_float(), off_diagonal_sum);
     const auto cells = cells_of<dim>(cloud.position, cell_size);
     AggregateFinder finder;
     finder.find(view(), cells, aggregates);
     GalerkinProduct().build(dim, view(), aggregates, finder, params, level);
   }
   UnitDiagonalView view() const {
-    return {matrix.pattern(), matrix.off_diagonal_float(), is_isolated};
+    return {matrix.pattern(), matrix.off_diagonal_float(), off_diagonal_sum};
   }
 };
 
@@ -62,8 +62,8 @@ Dense columns_of_prolongation(const Transfer &transfer, int rows) {
 
 Dense coarse_matrix(const CoarseLevel &level) {
   const int n = level.transfer.aggregates();
-  const std::vector<char> is_isolated;
-  Dense a = dense({level.off_diagonal.pattern, level.off_diagonal.value, is_isolated});
+  const std::vector<float> off_diagonal_sum;
+  Dense a = dense({level.off_diagonal.pattern, level.off_diagonal.value, off_diagonal_sum});
   for (int i = 0; i < n; ++i)
     a.row(i) /= level.scale[i];
   return a;
@@ -74,7 +74,10 @@ template <int dim> void expect_transfers_and_product(const Cloud<dim> &cloud) {
   Step<dim> step(cloud, 2.1, {.prolongation_weight = 0.7f, .drop_tolerance = 0});
   const int n = step.matrix.rows(), n_coarse = step.aggregates.count();
   const Dense a = dense(step.view());
-  const Dense p = (Dense::Identity(n, n) - 0.7 * a) * piecewise_constant(step.aggregates);
+  Dense weight = Dense::Zero(n, n);
+  for (int i = 0; i < n; ++i)
+    weight(i, i) = 1.4 / std::max(2.0, a.row(i).cwiseAbs().sum());
+  const Dense p = (Dense::Identity(n, n) - weight * a) * piecewise_constant(step.aggregates);
   EXPECT_LT((columns_of_prolongation(step.level.transfer, n) - p).cwiseAbs().maxCoeff(), 1e-6);
   EXPECT_LT((coarse_matrix(step.level) - p.transpose() * a * p).cwiseAbs().maxCoeff(), 2e-6);
 
@@ -115,7 +118,7 @@ TEST(Multigrid, lumping_small_entries_keeps_row_sums) {
 
 TEST(Multigrid, entries_beyond_the_next_cell_keep_the_row_sums_of_the_coarse_matrix) {
   const auto cloud = make_cloud<2>({.points = {17, 15}});
-  Step<2> step(cloud, 1.2, {.drop_tolerance = 0});
+  Step<2> step(cloud, 1.6, {.drop_tolerance = 0});
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(step.aggregates.count());
   const Dense p = columns_of_prolongation(step.level.transfer, step.matrix.rows());
   const Eigen::VectorXd fine_sums = dense(step.view()) * p * ones;
@@ -161,8 +164,8 @@ TEST(Aggregates, a_cell_cut_by_a_wall_gives_its_smaller_part_to_the_cell_it_is_c
   const std::vector<Cell> cells{{0, 0, 0}, {0, 0, 0}, {0, 0, 0}, {1, 0, 0},
                                 {1, 0, 0}, {1, 0, 0}, {2, 0, 0}, {2, 0, 0}};
   Aggregates aggregates;
-  const std::vector<char> is_isolated(8, 0);
-  AggregateFinder().find({matrix.pattern(), matrix.off_diagonal_float(), is_isolated}, cells,
+  const std::vector<float> off_diagonal_sum(8, 1);
+  AggregateFinder().find({matrix.pattern(), matrix.off_diagonal_float(), off_diagonal_sum}, cells,
                          aggregates);
   EXPECT_EQ(aggregates.of_row, (std::vector<int>{0, 0, 0, 1, 1, 2, 2, 2}));
 }
@@ -173,8 +176,8 @@ TEST(Aggregates, negative_cells_and_far_away_ones_are_cells_like_others) {
   const std::vector<Cell> cells{{-1, -1, 0}, {-2, -1, 0}, {900'000, -5, 0}, {900'000, -4, 0}};
   Aggregates aggregates;
   AggregateFinder finder;
-  const std::vector<char> is_isolated(4, 0);
-  finder.find({matrix.pattern(), matrix.off_diagonal_float(), is_isolated}, cells, aggregates);
+  const std::vector<float> off_diagonal_sum(4, 1);
+  finder.find({matrix.pattern(), matrix.off_diagonal_float(), off_diagonal_sum}, cells, aggregates);
   EXPECT_EQ(aggregates.of_row, (std::vector<int>{0, 1, 2, 3}));
   EXPECT_EQ(finder.aggregate_in(key_of({900'000, -5, 0}) + key_of({0, 1, 0})), 3);
   EXPECT_EQ(finder.aggregate_in(key_of({0, 0, 0})), -1);

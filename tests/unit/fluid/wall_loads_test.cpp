@@ -39,8 +39,9 @@ TEST_P(HydrostaticLoad, LeavesTheLowerEdgeAndTheDryFaceOfASealedGateDry) {
   for (const auto &sample : solver.quadrature().samples)
     EXPECT_NEAR(sample.position.x(), 0.1, 1e-12) << "wet at y = " << sample.position.y();
   for (std::size_t v = 0; v < solver.walls.position.size(); ++v)
-    if (solver.walls.position[v].x() > 0.1 + 1e-9)
+    if (solver.walls.position[v].x() > 0.1 + 1e-9) {
       EXPECT_EQ(solver.nodal_forces()[v].norm(), 0);
+    }
 }
 
 INSTANTIATE_TEST_SUITE_P(Spacings, HydrostaticLoad, ::testing::Values("0.004", "0.002"));
