@@ -81,7 +81,8 @@ public:
       solver_.begin_step(settings_.time_step);
       solver_.iterate();
       solver_.end_step();
-      finish_step(at_rest, static_cast<double>(window) * settings_.time_step);
+      finish_step(interface_totals(solver_, at_rest),
+                  static_cast<double>(window) * settings_.time_step);
     }
   }
 
@@ -116,7 +117,9 @@ public:
       std::vector<Vec<2>> increment = surface.displacement();
       for (std::size_t v = 0; v < increment.size(); ++v)
         increment[v] -= start_[v];
-      finish_step(increment, bridge.time());
+      const bridge::InterfaceTotals loads = interface_totals(solver_, increment);
+      bridge.report_totals(loads);
+      finish_step(loads, bridge.time());
     }
     bridge.finalize();
   }
@@ -129,8 +132,8 @@ public:
   }
 
 private:
-  void finish_step(std::span<const Vec<2>> increment, double time) {
-    history_.record(solver_, increment, time);
+  void finish_step(const bridge::InterfaceTotals &loads, double time) {
+    history_.record(solver_, loads, time);
     progress_.update(time, history_.note());
   }
 

@@ -33,6 +33,30 @@ Integrals integrate(const FluidSolver &solver) {
   return total;
 }
 
+bridge::InterfaceTotals interface_totals(const FluidSolver &solver,
+                                         std::span<const Vec<2>> increment) {
+  const Walls &walls = solver.walls;
+  bridge::InterfaceTotals total;
+  const auto &samples = solver.quadrature().samples;
+  for (std::size_t k = 0; k < samples.size(); ++k) {
+    const auto &s = samples[k];
+    const WallSegment &segment = walls.segments[s.segment];
+    const auto at = [&](std::span<const Vec<2>> v) -> Vec<2> {
+      return (1 - s.t) * v[segment.a] + s.t * v[segment.b];
+    };
+    const Vec<2> f = s.length * solver.tractions()[k];
+    const Vec<2> x = at(walls.position), moved = at(increment);
+    total.force[0] += f.x();
+    total.force[1] += f.y();
+    total.force_magnitude += f.norm();
+    total.moment[2] += cross(x, f);
+    total.moment_magnitude += x.norm() * f.norm();
+    total.work += f.dot(moved);
+    total.work_magnitude += f.norm() * moved.norm();
+  }
+  return total;
+}
+
 CentreLine::CentreLine(const Walls &walls) {
   const std::size_t n = walls.coupled_vertices.size();
   for (std::size_t k = 0; k < n / 2; ++k)

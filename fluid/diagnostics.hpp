@@ -2,6 +2,7 @@
 // Integral quantities of the fluid: what is watched, and checked against conservation.
 #pragma once
 
+#include "bridge/statistics.hpp"
 #include "fluid/step.hpp"
 
 namespace sluice::fluid {
@@ -21,6 +22,12 @@ struct Integrals {
 
 /// Positions are taken at the end of the step: stage position plus dt (u^{n+1} - u^n) / 2.
 Integrals integrate(const FluidSolver &solver);
+
+/// Force, moment about the origin and work of the fluid on the coupled walls: the fluid's own
+/// traction integral over its own quadrature, not the nodal forces that the bridge maps.
+/// `increment` is how far each wall vertex has moved in the step [m].
+bridge::InterfaceTotals interface_totals(const FluidSolver &solver,
+                                         std::span<const Vec<2>> increment);
 
 /// Centre line of a plate-like coupled wall whose outline runs down one face and up the other.
 class CentreLine {

@@ -14,7 +14,7 @@ std::string series_header(const std::vector<GaugeParams> &gauges) {
       "time_s,kinetic_j,potential_j,work_on_walls_j,outlet_energy_j,volume_m2,point_volume_m2,"
       "tank_volume_m2,tank_point_volume_m2,outflow_past_tip_m2,outflow_m2,max_speed_m_s,"
       "min_pressure_pa,max_pressure_pa,momentum_x_n_s,momentum_y_n_s,wall_force_x_n,"
-      "wall_force_y_n,guarded_rows,pressure_iterations,wall_returns,lost_points,points";
+      "wall_force_y_n,outlet_momentum_x_n_s,outlet_momentum_y_n_s,guarded_rows,pressure_iterations,wall_returns,lost_points,points";
   for (const GaugeParams &gauge : gauges)
     header += ",level_" + gauge.name + "_m";
   return header;
@@ -38,30 +38,12 @@ History::History(const Scene &scene, const FluidSolver &solver, std::filesystem:
   write_fields(solver, 0);
 }
 
-void History::record_loads(const FluidSolver &solver, std::span<const Vec<2>> increment,
+void History::record_loads(const FluidSolver &solver, const bridge::InterfaceTotals &loads,
                            double time) {
-  const Walls &walls = solver.walls;
-  Vec<2> force = Vec<2>::Zero();
-  double magnitude = 0, moment = 0, moment_magnitude = 0, work = 0, work_magnitude = 0;
-  const auto &samples = solver.quadrature().samples;
-  for (std::size_t k = 0; k < samples.size(); ++k) {
-    const auto &s = samples[k];
-    const WallSegment &segment = walls.segments[s.segment];
-    const auto at = [&](std::span<const Vec<2>> v) -> Vec<2> {
-      return (1 - s.t) * v[segment.a] + s.t * v[segment.b];
-    };
-    const Vec<2> f = s.length * solver.tractions()[k];
-    const Vec<2> x = at(walls.position), moved = at(increment);
-    force += f;
-    magnitude += f.norm();
-    moment += cross(x, f);
-    moment_magnitude += x.norm() * f.norm();
-    work += f.dot(moved);
-    work_magnitude += f.norm() * moved.norm();
-  }
-  work_on_walls_ += work;
-  loads_.row({static_cast<double>(solver.state.step), time, force.x(), force.y(), moment,
-              magnitude, moment_magnitude, work, work_magnitude});
+  work_on_walls_ += loads.work;
+  loads_.row({static_cast<double>(solver.state.step), time, loads.force[0], loads.force[1],
+              loads.moment[2], loads.force_magnitude, loads.moment_magnitude, loads.work,
+              loads.work_magnitude});
 }
 
 Vec<2> History::force_on_all_walls(const FluidSolver &solver) {
@@ -85,8 +67,8 @@ void History::update_extremes(const FluidSolver &solver, const Integrals &now) {
   ++steps_;
 }
 
-void History::record(const FluidSolver &solver, std::span<const Vec<2>> increment, double time) {
-  record_loads(solver, increment, time);
+void History::record(const FluidSolver &solver, const bridge::InterfaceTotals &loads, double time) {
+  record_loads(solver, loads, time);
   const Integrals now = integrate(solver);
   const Vec<2> wall_force =
       force_on_all_walls(solver) - solver.report().contact_impulse / solver.dt();
@@ -100,7 +82,7 @@ void History::record(const FluidSolver &solver, std::span<const Vec<2>> incremen
       initial_volume_ - now.tank_point_volume,
       static_cast<double>(state.outflow_points) * spacing * spacing, now.max_speed,
       now.min_pressure, now.max_pressure, now.momentum.x(), now.momentum.y(), wall_force.x(),
-      wall_force.y(),
+      wall_force.y(), state.outlet_momentum.x(), state.outlet_momentum.y(),
       static_cast<double>(solver.report().rows.linear + solver.report().rows.plain),
       static_cast<double>(solver.report().pressure_iterations),
       static_cast<double>(state.wall_returns), static_cast<double>(state.lost_points),

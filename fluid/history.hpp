@@ -18,9 +18,8 @@ public:
   History(const Scene &scene, const FluidSolver &solver, std::filesystem::path folder,
           double output_interval);
 
-  /// Records the step that has just ended at `time` [s]; walls.position are those at its end and
-  /// `increment` how far each wall vertex has moved in it [m].
-  void record(const FluidSolver &solver, std::span<const Vec<2>> increment, double time);
+  /// Records the step that has just ended at `time` [s]; `loads` are those on the coupled walls.
+  void record(const FluidSolver &solver, const bridge::InterfaceTotals &loads, double time);
   /// Writes fluid_summary.json. `message` is empty for a complete run.
   void write_summary(const FluidSolver &solver, const std::string &message,
                      const nlohmann::json &bridge_summary) const;
@@ -28,7 +27,7 @@ public:
   std::string note() const;
 
 private:
-  void record_loads(const FluidSolver &solver, std::span<const Vec<2>> increment, double time);
+  void record_loads(const FluidSolver &solver, const bridge::InterfaceTotals &loads, double time);
   void write_fields(const FluidSolver &solver, double time);
   Vec<2> force_on_all_walls(const FluidSolver &solver); // without contact [N/m]
   void update_extremes(const FluidSolver &solver, const Integrals &now);

@@ -34,6 +34,7 @@ struct FluidState {
   std::int64_t outflow_points = 0; // points that left through the outlet so far
   std::int64_t lost_points = 0;    // points that ended outside except through the outlet
   double outlet_energy = 0;        // energy of the points that left [J/m]
+  Vec<2> outlet_momentum{0, 0};    // momentum of the points that left [N s/m]
 };
 
 } // namespace sluice::fluid

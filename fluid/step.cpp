@@ -111,8 +111,11 @@ void FluidSolver::leave_through_outlet() {
     state.outflow_points += is_out;
     state.lost_points += is_lost;
     leaves[i] = is_out || is_lost;
-    if (leaves[i])
+    if (leaves[i]) {
       state.outlet_energy += energy_of_point(points.velocity[i], x);
+      state.outlet_momentum +=
+          params_.density * params_.spacing * params_.spacing * points.velocity[i];
+    }
     any = any || leaves[i];
   }
   if (any)

@@ -170,21 +170,21 @@ def total_energy(fluid):
 
 def momentum_balance(run, fluid):
     """Change of the water's momentum against its weight and the force on all walls, relative to
-    rho g H^2 / 2: (largest over the windows, of the whole run's impulses). Until water leaves
-    through the outlet, which carries momentum with it; None without the columns for it."""
-    needed = ("momentum_x_n_s", "momentum_y_n_s", "wall_force_x_n", "wall_force_y_n",
-              "point_volume_m2")
-    inside = fluid["outflow_m2"] <= NO_OUTFLOW_M2
-    if any(name not in fluid for name in needed) or inside.sum() < 2:
+    rho g H^2 / 2: (largest over the windows, of the whole run's impulses), what left through the
+    outlet included; None without the columns for it."""
+    needed = ("momentum_x_n_s", "momentum_y_n_s", "outlet_momentum_x_n_s", "outlet_momentum_y_n_s",
+              "wall_force_x_n", "wall_force_y_n", "point_volume_m2")
+    if any(name not in fluid for name in needed) or len(fluid["time_s"]) < 2:
         return None, None
     scene = run.case()["fluid"]
     gravity, density = np.array(scene["gravity_m_s2"]), scene["density_kg_m3"]
     depth = np.ptp(np.array(scene["water_m"])[:, 1])
     scale = 0.5 * density * np.linalg.norm(gravity) * depth**2
-    momentum = np.column_stack([fluid["momentum_x_n_s"], fluid["momentum_y_n_s"]])[inside]
-    on_walls = np.column_stack([fluid["wall_force_x_n"], fluid["wall_force_y_n"]])[inside]
-    weight = density * fluid["point_volume_m2"][inside, None] * gravity
-    window = np.diff(fluid["time_s"][inside])[:, None]
+    momentum = np.column_stack([fluid[f"momentum_{d}_n_s"] + fluid[f"outlet_momentum_{d}_n_s"]
+                                for d in "xy"])
+    on_walls = np.column_stack([fluid[f"wall_force_{d}_n"] for d in "xy"])
+    weight = density * fluid["point_volume_m2"][:, None] * gravity
+    window = np.diff(fluid["time_s"])[:, None]
     missing = np.diff(momentum, axis=0) - window * (weight - on_walls)[1:]
     of_windows = np.linalg.norm(missing / window, axis=1) / scale
     of_run = np.linalg.norm(missing.sum(axis=0)) / window.sum() / scale

@@ -146,6 +146,7 @@ class BalanceTest(RunTest):
         mass = 1000 * 0.014
         zero = 0 * time
         return {"time_s": time, "momentum_x_n_s": zero, "momentum_y_n_s": -mass * 9.81 * time,
+                "outlet_momentum_x_n_s": zero, "outlet_momentum_y_n_s": zero,
                 "wall_force_x_n": zero, "wall_force_y_n": zero + wall_force,
                 "point_volume_m2": zero + 0.014, "outflow_m2": zero}
 
@@ -153,6 +154,16 @@ class BalanceTest(RunTest):
         run = RunFolder(self.write())
         largest, mean = gate.momentum_balance(run, self.fluid_in_free_fall(0.0))
         self.assertLess(max(largest, mean), 1e-13)
+
+    def test_momentum_that_left_through_the_outlet_counts(self):
+        run = RunFolder(self.write())
+        fluid = self.fluid_in_free_fall(0.0)
+        fluid["momentum_y_n_s"] = fluid["momentum_y_n_s"] + 3.0
+        fluid["outlet_momentum_y_n_s"] = fluid["outlet_momentum_y_n_s"] - 3.0
+        fluid["momentum_y_n_s"][5:] += 2.0
+        fluid["outlet_momentum_y_n_s"][5:] -= 2.0
+        largest, mean = gate.momentum_balance(run, fluid)
+        self.assertLess(max(largest, mean), 1e-12)
 
     def test_force_on_a_wall_that_no_momentum_answers_is_seen(self):
         run = RunFolder(self.write())
