@@ -6,12 +6,18 @@
 #include "bridge/run_summary.hpp"
 #include "bridge/settings.hpp"
 #include "fluid/history.hpp"
+#include "fluid/state_file.hpp"
 
 #include <nlohmann/json.hpp>
 
 namespace sluice::fluid {
 
 namespace {
+
+// The map of a whole step jumps where a point changes its kind with the position of the wall, and an
+// iteration across a jump has no limit. From here on the cloud stays as the last full step built it:
+// the map is affine, and what is left to correct in the wall's position far below a spacing.
+constexpr int most_full_iterations = 8;
 
 /// The coupled walls as the bridge sees them, and the way back.
 class CoupledSurface {
@@ -66,18 +72,47 @@ private:
   std::vector<double> values_;
 };
 
+/// A scene and the time of its first state.
+struct Start {
+  Scene scene;
+  double time = 0;
+};
+
+/// The water as filled, or as another run left it.
+Start start_of(const Config &config) {
+  Start start{.scene = read_scene(config)};
+  const FluidParams &params = start.scene.params;
+  if (params.start_state.empty())
+    return start;
+  SavedState saved = read_state(params.start_state);
+  check(std::abs(saved.spacing - params.spacing) <= 1e-12 * params.spacing,
+        "{}: its points are {} m apart, fluid.spacing_m is {} m", params.start_state,
+        saved.spacing, params.spacing);
+  start.scene.initial = std::move(saved.state);
+  start.time = saved.time;
+  return start;
+}
+
 /// One step alone or one window with a partner.
 class Run {
 public:
   Run(const Config &config, const std::filesystem::path &folder)
-      : settings_(config.read<bridge::CaseSettings>("case")), scene_(read_scene(config)),
-        solver_(scene_), history_(scene_, solver_, folder, settings_.output_interval),
-        progress_("fluid", settings_.end_time) {}
+      : settings_(config.read<bridge::CaseSettings>("case")), start_(start_of(config)),
+        solver_(start_.scene),
+        history_(start_.scene, solver_, folder, settings_.output_interval, start_.time),
+        progress_("fluid", settings_.end_time) {
+    check(!has_partner() || start_.time == 0,
+          "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s",
+          start_.time);
+    check(start_.time < settings_.end_time,
+          "fluid.start_state is of t = {} s, the run ends at case.end_time_s = {}", start_.time,
+          settings_.end_time);
+  }
 
   void alone() {
     const long n = settings_.n_windows();
     const std::vector<Vec<2>> at_rest(solver_.walls.position.size(), Vec<2>::Zero());
-    for (long window = 1; window <= n; ++window) {
+    for (long window = std::lround(start_.time / settings_.time_step) + 1; window <= n; ++window) {
       solver_.begin_step(settings_.time_step);
       solver_.iterate();
       solver_.end_step();
@@ -90,14 +125,15 @@ public:
     CoupledSurface surface(solver_.walls);
     bridge.set_mesh(surface.mesh(solver_.walls));
     bridge.initialize();
-    const bool repeats_step = bridge.settings().iterate == "full";
+    const bool repeats_steps = bridge.settings().iterate == "full";
     while (bridge.is_coupling_ongoing()) {
       const double dt = bridge.max_time_step_size();
       const bool is_first = bridge.iteration() == 1;
+      const bool repeats_step = repeats_steps && bridge.iteration() <= most_full_iterations;
       if (is_first) {
         surface.read_positions(bridge, 0, solver_.walls);
-        start_ = surface.displacement();
-        if (repeats_step)
+        moved_from_ = surface.displacement();
+        if (repeats_steps)
           saved_ = solver_.state;
       } else if (repeats_step) {
         solver_.state = saved_;
@@ -116,7 +152,7 @@ public:
       surface.read_positions(bridge, 0, solver_.walls);
       std::vector<Vec<2>> increment = surface.displacement();
       for (std::size_t v = 0; v < increment.size(); ++v)
-        increment[v] -= start_[v];
+        increment[v] -= moved_from_[v];
       const bridge::InterfaceTotals loads = interface_totals(solver_, increment);
       bridge.report_totals(loads);
       finish_step(loads, bridge.time());
@@ -128,7 +164,7 @@ public:
     history_.write_summary(solver_, message, bridge_summary);
   }
   bool has_partner() const {
-    return !scene_.walls.coupled_vertices.empty() && scene_.params.coupled_walls == "move";
+    return !start_.scene.walls.coupled_vertices.empty() && start_.scene.params.coupled_walls == "move";
   }
 
 private:
@@ -138,12 +174,12 @@ private:
   }
 
   bridge::CaseSettings settings_;
-  Scene scene_;
+  Start start_;
   FluidSolver solver_;
   History history_;
   Progress progress_;
   FluidState saved_;
-  std::vector<Vec<2>> start_; // displacement of the wall vertices at the window's start [m]
+  std::vector<Vec<2>> moved_from_; // displacement of the wall vertices at the window's start [m]
 };
 
 } // namespace

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/history.hpp"
 
+#include "fluid/state_file.hpp"
+
 #include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
@@ -23,19 +25,23 @@ std::string series_header(const std::vector<GaugeParams> &gauges) {
 } // namespace
 
 History::History(const Scene &scene, const FluidSolver &solver, std::filesystem::path folder,
-                 double output_interval)
+                 double output_interval, double time)
     : folder_(std::move(folder)), gauges_(scene.gauges),
       series_(folder_ / "fluid.csv", series_header(gauges_)),
       loads_(folder_ / "fluid_loads.csv", "window,time_s,fx_n,fy_n,moment_nm,magnitude_n,"
                                           "moment_magnitude_nm,work_j,work_magnitude_j"),
-      points_(folder_), walls_(folder_), output_interval_(output_interval) {
+      points_(folder_), walls_(folder_), output_interval_(output_interval), last_time_(time) {
   const FluidParams &params = scene.params;
   const double mass = params.density * params.spacing * params.spacing;
-  for (const Vec<2> &x : solver.state.points.position)
-    start_.potential -= mass * params.gravity.dot(x);
+  const Points &points = solver.state.points;
+  for (int i = 0; i < points.size(); ++i) {
+    start_.kinetic += 0.5 * mass * points.velocity[i].squaredNorm();
+    start_.potential -= mass * params.gravity.dot(points.position[i]);
+  }
+  outlet_energy_ = start_outlet_energy_ = solver.outlet_energy();
   initial_volume_ = solver.state.points.size() * params.spacing * params.spacing;
   last_ = start_;
-  write_fields(solver, 0);
+  write_fields(solver, time);
 }
 
 void History::record_loads(const FluidSolver &solver, const bridge::InterfaceTotals &loads,
@@ -55,7 +61,7 @@ Vec<2> History::force_on_all_walls(const FluidSolver &solver) {
 }
 
 void History::update_extremes(const FluidSolver &solver, const Integrals &now) {
-  const double energy0 = start_.kinetic + start_.potential;
+  const double energy0 = start_.kinetic + start_.potential + start_outlet_energy_;
   const double energy = now.kinetic + now.potential + work_on_walls_ + outlet_energy_;
   energy_gain_max_ = std::max(energy_gain_max_, (energy - energy0) / std::abs(energy0));
   volume_drift_max_ =
@@ -100,7 +106,12 @@ void History::write_fields(const FluidSolver &solver, double time) {
     return;
   points_.write(solver.state.points, solver.cloud(), solver.state.step, time);
   walls_.write(solver.walls, solver.state.step, time);
+  write_state_file(solver, time);
   next_output_ += output_interval_ * std::ceil((time - next_output_) / output_interval_ + 1e-6);
+}
+
+void History::write_state_file(const FluidSolver &solver, double time) const {
+  write_state(folder_ / "fluid_state.h5", {solver.state, time, solver.params().spacing});
 }
 
 std::string History::note() const {
@@ -118,7 +129,7 @@ void History::write_summary(const FluidSolver &solver, const std::string &messag
     own += seconds;
   }
   const double area = solver.params().spacing * solver.params().spacing;
-  const double energy0 = start_.kinetic + start_.potential;
+  const double energy0 = start_.kinetic + start_.potential + start_outlet_energy_;
   summary["points"] = solver.state.points.size() + solver.state.outflow_points +
                       solver.state.lost_points;
   summary["spacing_m"] = solver.params().spacing;
@@ -143,6 +154,8 @@ void History::write_summary(const FluidSolver &solver, const std::string &messag
   summary["completed"] = message.empty();
   if (!message.empty())
     summary["message"] = message;
+  if (message.empty())
+    write_state_file(solver, last_time_);
   std::ofstream(folder_ / "fluid_summary.json") << summary.dump(2) << '\n';
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// What a run leaves behind: one row per step in fluid.csv and fluid_loads.csv, fields at intervals,
-// and fluid_summary.json at the end, also of a run that failed.
+// What a run leaves behind: one row per step in fluid.csv and fluid_loads.csv, fields and the state
+// (fluid_state.h5, the latest) at intervals, and fluid_summary.json at the end, also of a run that
+// failed.
 #pragma once
 
 #include "bridge/base/csv.hpp"
@@ -15,12 +16,13 @@ namespace sluice::fluid {
 
 class History {
 public:
+  /// `time` [s] is that of the solver's first state.
   History(const Scene &scene, const FluidSolver &solver, std::filesystem::path folder,
-          double output_interval);
+          double output_interval, double time = 0);
 
   /// Records the step that has just ended at `time` [s]; `loads` are those on the coupled walls.
   void record(const FluidSolver &solver, const bridge::InterfaceTotals &loads, double time);
-  /// Writes fluid_summary.json. `message` is empty for a complete run.
+  /// Writes fluid_summary.json, and of a complete run the state; `message` is empty for such a run.
   void write_summary(const FluidSolver &solver, const std::string &message,
                      const nlohmann::json &bridge_summary) const;
   /// Short text for the progress line.
@@ -29,6 +31,7 @@ public:
 private:
   void record_loads(const FluidSolver &solver, const bridge::InterfaceTotals &loads, double time);
   void write_fields(const FluidSolver &solver, double time);
+  void write_state_file(const FluidSolver &solver, double time) const;
   Vec<2> force_on_all_walls(const FluidSolver &solver); // without contact [N/m]
   void update_extremes(const FluidSolver &solver, const Integrals &now);
 
@@ -41,7 +44,7 @@ private:
   Stopwatch watch_;
 
   // running sums
-  double work_on_walls_ = 0, outlet_energy_ = 0, last_time_ = 0;
+  double work_on_walls_ = 0, outlet_energy_ = 0, start_outlet_energy_ = 0, last_time_ = 0;
   Integrals start_, last_;
   long guarded_rows_ = 0, steps_ = 0, pressure_iterations_ = 0, pressure_solves_ = 0;
   double volume_drift_max_ = 0, energy_gain_max_ = -1e300;

@@ -23,6 +23,7 @@ struct FluidParams {
   double outlet_x = 1e300;
   bool open_sides = false;
   std::string coupled_walls = "move";
+  std::string start_state;
   double pressure_tolerance = 1e-7;
   double row_guard = 0.1;
   double noise_damping = 0.5;
@@ -42,6 +43,8 @@ struct FluidParams {
     read("open_sides", open_sides, "water may touch air at its sides and below at t = 0");
     read("coupled_walls", coupled_walls, "what coupled walls do")
         .one_of({"move", "stay"});
+    read("start_state", start_state,
+         "file fluid_state.h5 of a run to go on from, instead of filling water_m");
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative").positive();
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
     read("noise_damping", noise_damping,

@@ -5,6 +5,7 @@
 #include "bridge/base/check.hpp"
 #include "bridge/base/config.hpp"
 #include "bridge/interface_mesh.hpp"
+#include "tests/support/temporary_folder.hpp"
 
 #include <gtest/gtest.h>
 
@@ -29,25 +30,6 @@ template <class Action> std::string error_of(Action &&action) {
   }
   return "";
 }
-
-/// A folder of this test's own, removed at the end.
-class TemporaryFolder {
-public:
-  TemporaryFolder() {
-    std::string name = (std::filesystem::temp_directory_path() / "sluice-test-XXXXXX").string();
-    path_ = ::mkdtemp(name.data());
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    std::filesystem::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder &) = delete;
-  TemporaryFolder &operator=(const TemporaryFolder &) = delete;
-  const std::filesystem::path &path() const { return path_; }
-
-private:
-  std::filesystem::path path_;
-};
 
 inline std::vector<double> random_values(std::size_t n, unsigned seed, double size = 1) {
   std::mt19937 engine(seed);

@@ -1,0 +1,225 @@
+// SPDX-License-Identifier: MIT
+#include "fluid/state_file.hpp"
+
+#include "bridge/base/check.hpp"
+
+#include <hdf5.h>
+#include <string>
+#include <type_traits>
+
+namespace sluice::fluid {
+
+namespace {
+
+constexpr const char *format_name = "sluice-fluid-state";
+constexpr int format_version = 1;
+
+// A handle of the library, closed at the end of its scope.
+class Handle {
+public:
+  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
+  Handle(const Handle &) = delete;
+  Handle &operator=(const Handle &) = delete;
+  ~Handle() {
+    if (id_ >= 0)
+      close_(id_);
+  }
+  operator hid_t() const { return id_; }
+  bool is_valid() const { return id_ >= 0; }
+
+private:
+  hid_t id_;
+  herr_t (*close_)(hid_t);
+};
+
+template <class T> hid_t type_of() {
+  if constexpr (std::is_same_v<T, double>)
+    return H5T_NATIVE_DOUBLE;
+  else if constexpr (std::is_same_v<T, std::int64_t>)
+    return H5T_NATIVE_INT64;
+  else if constexpr (std::is_same_v<T, std::int32_t>)
+    return H5T_NATIVE_INT32;
+  else
+    return H5T_NATIVE_UINT8;
+}
+
+// The parts of a point's value as the file holds them.
+template <class T> struct Layout {
+  using Number = std::conditional_t<std::is_enum_v<T>, std::uint8_t, T>;
+  static constexpr int components = 1;
+};
+template <> struct Layout<Vec<2>> {
+  using Number = double;
+  static constexpr int components = 2;
+};
+
+// body(name, array) for every array of the points, and body(name, number) for every counter:
+// the one list that writing and reading share.
+template <class Points, class Body> void for_each_array(Points &points, Body &&body) {
+  body("position", points.position);
+  body("velocity", points.velocity);
+  body("previous_velocity", points.previous_velocity);
+  body("shift", points.shift);
+  body("shift_velocity", points.shift_velocity);
+  body("pressure", points.pressure);
+  body("id", points.id);
+  body("at_surface", points.at_surface);
+}
+
+template <class Saved, class Body> void for_each_number(Saved &saved, Body &&body) {
+  auto &state = saved.state;
+  body("spacing_m", saved.spacing);
+  body("time_s", saved.time);
+  body("step", state.step);
+  body("wall_returns", state.wall_returns);
+  body("outflow_points", state.outflow_points);
+  body("lost_points", state.lost_points);
+  body("outlet_energy_j", state.outlet_energy);
+  body("outlet_momentum_x_n_s", state.outlet_momentum.x());
+  body("outlet_momentum_y_n_s", state.outlet_momentum.y());
+}
+
+class Writer {
+public:
+  explicit Writer(const std::filesystem::path &file)
+      : name_(file.string()),
+        file_(H5Fcreate(name_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT), H5Fclose) {
+    expect(file_.is_valid());
+  }
+
+  void write(const SavedState &saved) {
+    write_text("format", format_name);
+    write_number("version", std::int32_t{format_version});
+    for_each_number(saved, [&](const char *name, const auto &x) { write_number(name, x); });
+    const Handle group(H5Gcreate2(file_, "points", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    expect(group.is_valid());
+    for_each_array(saved.state.points,
+                   [&](const char *name, const auto &x) { write_array(group, name, x); });
+    expect(H5Fflush(file_, H5F_SCOPE_LOCAL) >= 0);
+  }
+
+private:
+  void expect(bool success) const {
+    check(success, "{}: cannot be written; is the folder writable and the disk not full?", name_);
+  }
+
+  void write_text(const char *name, const std::string &text) {
+    const Handle type(H5Tcopy(H5T_C_S1), H5Tclose);
+    expect(H5Tset_size(type, text.size()) >= 0);
+    write_attribute(name, type, text.data());
+  }
+  template <class T> void write_number(const char *name, const T &x) {
+    write_attribute(name, type_of<T>(), &x);
+  }
+  void write_attribute(const char *name, hid_t type, const void *value) {
+    const Handle space(H5Screate(H5S_SCALAR), H5Sclose);
+    const Handle attribute(H5Acreate2(file_, name, type, space, H5P_DEFAULT, H5P_DEFAULT),
+                           H5Aclose);
+    expect(attribute.is_valid() && H5Awrite(attribute, type, value) >= 0);
+  }
+
+  template <class T>
+  void write_array(hid_t group, const char *name, const std::vector<T> &values) {
+    const std::array<hsize_t, 2> size{values.size(), Layout<T>::components};
+    const Handle space(H5Screate_simple(Layout<T>::components > 1 ? 2 : 1, size.data(), nullptr),
+                       H5Sclose);
+    const hid_t type = type_of<typename Layout<T>::Number>();
+    const Handle data(
+        H5Dcreate2(group, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+    expect(data.is_valid() &&
+           H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
+  }
+
+  std::string name_;
+  Handle file_;
+};
+
+class Reader {
+public:
+  explicit Reader(const std::filesystem::path &file)
+      : name_(file.string()), file_(H5Fopen(name_.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT), H5Fclose) {
+    check(file_.is_valid(), "{}: not a readable HDF5 file", name_);
+  }
+
+  SavedState read() {
+    check(H5Aexists(file_, "format") > 0, "{}: not a state that sluice-fluid wrote", name_);
+    std::int32_t version = 0;
+    read_number("version", version);
+    check(version == format_version, "{}: written in version {} of the format, this program reads "
+                                     "version {}",
+          name_, version, format_version);
+    SavedState saved;
+    for_each_number(saved, [&](const char *name, auto &x) { read_number(name, x); });
+    const Handle group(H5Gopen2(file_, "points", H5P_DEFAULT), H5Gclose);
+    check(group.is_valid(), "{}: holds no points", name_);
+    for_each_array(saved.state.points,
+                   [&](const char *name, auto &x) { read_array(group, name, x); });
+    return saved;
+  }
+
+private:
+  template <class T> void read_number(const char *name, T &x) {
+    const Handle attribute(H5Aopen(file_, name, H5P_DEFAULT), H5Aclose);
+    check(attribute.is_valid() && H5Aread(attribute, type_of<T>(), &x) >= 0,
+          "{}: the attribute '{}' is missing or damaged", name_, name);
+  }
+
+  template <class T> void read_array(hid_t group, const char *name, std::vector<T> &values) {
+    const Handle data(H5Dopen2(group, name, H5P_DEFAULT), H5Dclose);
+    check(data.is_valid(), "{}: the array 'points/{}' is missing", name_, name);
+    const Handle space(H5Dget_space(data), H5Sclose);
+    std::array<hsize_t, 2> size{0, 1};
+    const int rank = H5Sget_simple_extent_ndims(space);
+    const int expected = Layout<T>::components > 1 ? 2 : 1;
+    if (rank == expected)
+      H5Sget_simple_extent_dims(space, size.data(), nullptr);
+    check(rank == expected && size[1] == Layout<T>::components,
+          "{}: the array 'points/{}' does not hold {} numbers per point", name_, name,
+          static_cast<int>(Layout<T>::components));
+    if (n_points_ == unknown)
+      n_points_ = size[0];
+    check(size[0] == n_points_, "{}: the array 'points/{}' has {} entries, the first one has {}",
+          name_, name, size[0], n_points_);
+    values.resize(size[0]);
+    check(H5Dread(data, type_of<typename Layout<T>::Number>(), H5S_ALL, H5S_ALL, H5P_DEFAULT,
+                  values.data()) >= 0,
+          "{}: the array 'points/{}' is damaged", name_, name);
+  }
+
+  static constexpr hsize_t unknown = ~hsize_t{0};
+  std::string name_;
+  Handle file_;
+  hsize_t n_points_ = unknown;
+};
+
+// The library prints every failure by itself unless told not to; ours are in the exceptions.
+class Quiet {
+public:
+  Quiet() {
+    H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
+    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
+  }
+  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
+
+private:
+  H5E_auto2_t print_ = nullptr;
+  void *data_ = nullptr;
+};
+
+} // namespace
+
+void write_state(const std::filesystem::path &file, const SavedState &saved) {
+  const Quiet quiet;
+  std::filesystem::path unfinished = file;
+  unfinished += ".part";
+  Writer(unfinished).write(saved);
+  std::filesystem::rename(unfinished, file);
+}
+
+SavedState read_state(const std::filesystem::path &file) {
+  const Quiet quiet;
+  check(std::filesystem::exists(file), "{}: there is no such file", file.string());
+  return Reader(file).read();
+}
+
+} // namespace sluice::fluid
