@@ -78,8 +78,12 @@ struct Start {
   double time = 0;
 };
 
+bool has_partner(const Scene &scene) {
+  return !scene.walls.coupled_vertices.empty() && scene.params.coupled_walls == "move";
+}
+
 /// The water as filled, or as another run left it.
-Start start_of(const Config &config) {
+Start start_of(const Config &config, const bridge::CaseSettings &settings) {
   Start start{.scene = read_scene(config)};
   const FluidParams &params = start.scene.params;
   if (params.start_state.empty())
@@ -88,6 +92,12 @@ Start start_of(const Config &config) {
   check(std::abs(saved.spacing - params.spacing) <= 1e-12 * params.spacing,
         "{}: its points are {} m apart, fluid.spacing_m is {} m", params.start_state,
         saved.spacing, params.spacing);
+  check(!has_partner(start.scene),
+        "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s",
+        saved.time);
+  check(saved.time < settings.end_time,
+        "{}: its state is of t = {} s, the run ends at case.end_time_s = {}", params.start_state,
+        saved.time, settings.end_time);
   start.scene.initial = std::move(saved.state);
   start.time = saved.time;
   return start;
@@ -97,17 +107,10 @@ Start start_of(const Config &config) {
 class Run {
 public:
   Run(const Config &config, const std::filesystem::path &folder)
-      : settings_(config.read<bridge::CaseSettings>("case")), start_(start_of(config)),
+      : settings_(config.read<bridge::CaseSettings>("case")), start_(start_of(config, settings_)),
         solver_(start_.scene),
         history_(start_.scene, solver_, folder, settings_.output_interval, start_.time),
-        progress_("fluid", settings_.end_time) {
-    check(!has_partner() || start_.time == 0,
-          "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s",
-          start_.time);
-    check(start_.time < settings_.end_time,
-          "fluid.start_state is of t = {} s, the run ends at case.end_time_s = {}", start_.time,
-          settings_.end_time);
-  }
+        progress_("fluid", settings_.end_time) {}
 
   void alone() {
     const long n = settings_.n_windows();
@@ -163,9 +166,7 @@ public:
   void write_summary(const std::string &message, const nlohmann::json &bridge_summary) const {
     history_.write_summary(solver_, message, bridge_summary);
   }
-  bool has_partner() const {
-    return !start_.scene.walls.coupled_vertices.empty() && start_.scene.params.coupled_walls == "move";
-  }
+  bool has_partner() const { return fluid::has_partner(start_.scene); }
 
 private:
   void finish_step(const bridge::InterfaceTotals &loads, double time) {
@@ -183,6 +184,14 @@ private:
 };
 
 } // namespace
+
+std::string describe(const Config &config) {
+  const Start start = start_of(config, config.read<bridge::CaseSettings>("case"));
+  if (has_partner(start.scene))
+    config.read<bridge::BridgeSettings>("bridge");
+  return fmt::format("{} points, {} wall segments", start.scene.initial.points.size(),
+                     start.scene.walls.segments.size());
+}
 
 void run(const Config &config, const std::filesystem::path &folder) {
   Run run(config, folder);

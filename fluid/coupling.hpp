@@ -5,8 +5,12 @@
 #include "bridge/base/config.hpp"
 
 #include <filesystem>
+#include <string>
 
 namespace sluice::fluid {
+
+/// Reads all that a run would start from and says what that is. Throws UserError like `run`.
+std::string describe(const Config &config);
 
 /// Runs the case to its end, writing into `folder`. Throws UserError on any failure, after the
 /// summary of what was computed has been written and the partner has been told.

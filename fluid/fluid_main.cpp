@@ -2,7 +2,6 @@
 // sluice-fluid CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--check]
 #include "fluid/coupling.hpp"
 #include "fluid/parallel.hpp"
-#include "fluid/scene.hpp"
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
@@ -23,9 +22,7 @@ void run(const Options &options) {
   if (options.threads > 0)
     fluid::set_number_of_threads(options.threads);
   if (options.check_only) {
-    const fluid::Scene scene = fluid::read_scene(config);
-    fmt::print("fluid: {} points, {} wall segments\n", scene.initial.points.size(),
-               scene.walls.segments.size());
+    fmt::print("fluid: {}\n", fluid::describe(config));
     return;
   }
   std::filesystem::create_directories(options.out);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "solid-dealii/dealii_mesh.hpp"
 
+#include <deal.II/base/multithread_info.h>
 #include <deal.II/base/quadrature_lib.h>
 #include <deal.II/fe/fe_tools.h>
 #include <deal.II/fe/fe_values.h>
@@ -53,6 +54,8 @@ template <int dim> void make_triangulation(const Box<dim> &box, dealii::Triangul
 template <int dim> class Builder {
 public:
   Builder(const Box<dim> &box, ElementKind kind) {
+    // With tasks the last bit of the set-up depends on how many threads there are.
+    dealii::MultithreadInfo::set_thread_limit(1);
     check_box(box);
     result_.kind = kind;
     result_.degree = kind == ElementKind::q2 ? 2 : 1;

@@ -101,16 +101,70 @@ void report_failures(const RunOutcome &outcome, const Case &scene, const fs::pat
   fmt::print(stderr, "  output so far and the logs: {}\n", folder.string());
 }
 
+/// A folder of its own under the system's temporary one, gone at the end of the scope.
+class TemporaryFolder {
+public:
+  TemporaryFolder() {
+    std::string pattern = (fs::temp_directory_path() / "sluice-XXXXXX").string();
+    check(mkdtemp(pattern.data()) != nullptr, "sluice: cannot make a temporary folder {}", pattern);
+    path_ = pattern;
+  }
+  ~TemporaryFolder() {
+    std::error_code ignored;
+    fs::remove_all(path_, ignored);
+  }
+  TemporaryFolder(const TemporaryFolder &) = delete;
+  TemporaryFolder &operator=(const TemporaryFolder &) = delete;
+  const fs::path &path() const { return path_; }
+
+private:
+  fs::path path_;
+};
+
+void print_check(const Outcome &outcome) {
+  if (outcome.ok())
+    fmt::print("{}: OK\n", outcome.participant);
+  else
+    print_failure(outcome);
+}
+
+/// What every participant says of the case, without computing anything.
+RunOutcome ask_participants(const std::vector<Participant> &participants, const Options &options) {
+  const TemporaryFolder logs;
+  std::vector<Command> commands;
+  for (const Participant &participant : participants) {
+    auto arguments = arguments_of(options);
+    arguments.emplace_back("--check");
+    commands.push_back({participant.name, participant.program, std::move(arguments),
+                        logs.path() / (participant.name + ".log"), Shown::no});
+  }
+  return run_together(commands, Deadlines{});
+}
+
+/// A case that one of them refuses is not started: its partner would wait for it in vain.
+int report_refusal(const RunOutcome &outcome, const Case &scene) {
+  if (outcome.signal != 0)
+    return 128 + outcome.signal;
+  fmt::print(stderr, "sluice: {} failed\n", scene.name);
+  for (const Outcome &participant : outcome.participants)
+    if (!participant.ok())
+      print_failure(participant);
+  return exit_failed;
+}
+
 int run(const Options &options) {
   const Config config = Config::load(options.case_file, options.overrides);
   const Case scene = read_case(config);
   const auto participants = participants_of(config, options.programs);
   const fs::path folder =
       fs::absolute(options.out.empty() ? fs::path("out") / scene.name : fs::path(options.out));
+  const int threads = prepare_environment(options.threads);
+  if (const RunOutcome answers = ask_participants(participants, options); !answers.ok())
+    return report_refusal(answers, scene);
   prepare_run_folder(folder, scene.name, options.case_file);
 
   RunDescription description{scene.name, fs::absolute(options.case_file).string(),
-                             options.overrides, prepare_environment(options.threads), now_utc()};
+                             options.overrides, threads, now_utc()};
   std::vector<Command> commands;
   for (const Participant &participant : participants) {
     auto arguments = arguments_of(options);
@@ -139,48 +193,12 @@ int run(const Options &options) {
   return 0;
 }
 
-/// A folder of its own under the system's temporary one, gone at the end of the scope.
-class TemporaryFolder {
-public:
-  TemporaryFolder() {
-    std::string pattern = (fs::temp_directory_path() / "sluice-XXXXXX").string();
-    check(mkdtemp(pattern.data()) != nullptr, "sluice: cannot make a temporary folder {}", pattern);
-    path_ = pattern;
-  }
-  ~TemporaryFolder() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  TemporaryFolder(const TemporaryFolder &) = delete;
-  TemporaryFolder &operator=(const TemporaryFolder &) = delete;
-  const fs::path &path() const { return path_; }
-
-private:
-  fs::path path_;
-};
-
-void print_check(const Outcome &outcome) {
-  if (outcome.ok())
-    fmt::print("{}: OK\n", outcome.participant);
-  else
-    print_failure(outcome);
-}
-
 int check_case(const Options &options) {
   const Config config = Config::load(options.case_file, options.overrides);
   read_case(config);
   const auto participants = participants_of(config, options.programs);
   prepare_environment(options.threads);
-
-  const TemporaryFolder logs;
-  std::vector<Command> commands;
-  for (const Participant &participant : participants) {
-    auto arguments = arguments_of(options);
-    arguments.emplace_back("--check");
-    commands.push_back({participant.name, participant.program, std::move(arguments),
-                        logs.path() / (participant.name + ".log"), Shown::no});
-  }
-  const RunOutcome outcome = run_together(commands, Deadlines{});
+  const RunOutcome outcome = ask_participants(participants, options);
   for (const Outcome &participant : outcome.participants)
     print_check(participant);
   if (!outcome.ok())

@@ -51,9 +51,10 @@ class LauncherTest(unittest.TestCase):
         self.program("fluid", WELL)
         self.program("solid", WELL)
 
-    def program(self, part, script):
+    def program(self, part, script, check=""):
+        """A stand-in that runs `script`, and `check` when it is asked to look at the case only."""
         path = self.folder / f"sluice-{part}"
-        path.write_text(PROLOGUE + script)
+        path.write_text(f"{PROLOGUE}if [ $mode = check ]; then :; {check}\nexit; fi\n{script}")
         path.chmod(0o755)
 
     def command(self, verb, *arguments):
@@ -291,17 +292,26 @@ class CheckTest(LauncherTest):
         return subprocess.run(self.command("check"), capture_output=True, text=True, timeout=30)
 
     def test_good_case(self):
-        for part in ("fluid", "solid"):
-            self.program(part, "[ $mode = check ]\n")
         done = self.check()
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertEqual(done.stdout.splitlines()[-1], f"{self.case}: OK")
 
     def test_error_of_a_participant_is_shown(self):
-        self.program("fluid", "echo 'sluice-fluid: gate.toml:6:1: spacing' >&2; exit 1\n")
+        self.program("fluid", WELL, check="echo 'sluice-fluid: gate.toml:6:1: spacing' >&2; exit 1")
         done = self.check()
         self.assertEqual(done.returncode, 1)
         self.assertIn("gate.toml:6:1: spacing", done.stderr)
+
+    def test_case_that_a_participant_refuses_is_not_started_and_costs_no_output(self):
+        self.assertEqual(self.run_case().returncode, 0)
+        before = self.summary()
+        self.program("fluid", WELL, check="echo 'sluice-fluid: gate.toml:6:1: spacing' >&2; exit 1")
+        started = time.monotonic()
+        done = self.run_case()
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("gate.toml:6:1: spacing", done.stderr)
+        self.assertLess(time.monotonic() - started, 5, "the partner is not waited for")
+        self.assertEqual(self.summary(), before)
 
 
 class TerminalTest(LauncherTest):
