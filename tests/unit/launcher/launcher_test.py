@@ -116,7 +116,7 @@ class CompleteRunTest(LauncherTest):
         environment = {k: v for k, v in os.environ.items() if not k.startswith(("OMP", "GOMP"))}
         self.run_case("--threads", "3", env=environment)
         said = (self.out / "fluid.log").read_text()
-        for line in ("OMP_NUM_THREADS=3", "OMP_WAIT_POLICY=passive", "GOMP_SPINCOUNT=10000",
+        for line in ("OMP_NUM_THREADS=3", "OMP_WAIT_POLICY=passive", "GOMP_SPINCOUNT=3000",
                      "OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"):
             self.assertIn(line, said)
 
