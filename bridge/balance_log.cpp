@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sluice::bridge {
 
@@ -10,11 +11,16 @@ namespace {
 
 using Vector = std::array<double, 3>;
 
-// Largest difference of the components relative to the sum of magnitudes.
+// Largest difference of the components relative to the sum of magnitudes; infinite when one of them
+// is not a number.
 double imbalance(const Vector &a, const Vector &b, double magnitude) {
   double largest = 0;
-  for (std::size_t d = 0; d < 3; ++d)
-    largest = std::max(largest, std::abs(a[d] - b[d]));
+  for (std::size_t d = 0; d < 3; ++d) {
+    const double difference = std::abs(a[d] - b[d]);
+    if (!std::isfinite(difference))
+      return std::numeric_limits<double>::infinity();
+    largest = std::max(largest, difference);
+  }
   return largest == 0 ? 0 : largest / magnitude;
 }
 

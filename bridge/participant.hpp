@@ -119,10 +119,11 @@ template <class Loop> void run_coupled(Participant &bridge, Loop &&loop) {
   }
 }
 
-/// Sums over the interface for report_totals. `positions` are the current node positions [m],
-/// `forces` the nodal forces [N], `increments` the window's displacement increments [m].
+/// Sums over the interface for report_totals. `positions` are those of the reference configuration
+/// [m], `forces` the nodal forces [N], `start` and `end` the displacements at both ends of the
+/// window [m].
 InterfaceTotals interface_totals(int dim, std::span<const double> positions,
-                                 std::span<const double> forces,
-                                 std::span<const double> increments);
+                                 std::span<const double> forces, std::span<const double> start,
+                                 std::span<const double> end);
 
 } // namespace sluice::bridge

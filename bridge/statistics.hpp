@@ -17,7 +17,8 @@ struct InterfaceTotals {
   double work = 0;                ///< [J] force times the window's accepted displacement increment
   double force_magnitude = 0;     ///< [N]
   double moment_magnitude = 0;    ///< [N m]
-  double work_magnitude = 0;      ///< [J]
+  /// [J] of force times either displacement: their difference keeps the rounding of both
+  double work_magnitude = 0;
 };
 
 struct Statistics {

@@ -119,7 +119,7 @@ public:
       solver_.begin_step(settings_.time_step);
       solver_.iterate();
       solver_.end_step();
-      finish_step(interface_totals(solver_, at_rest),
+      finish_step(interface_totals(solver_, at_rest, at_rest),
                   static_cast<double>(window) * settings_.time_step);
     }
   }
@@ -153,10 +153,8 @@ public:
         continue;
       solver_.end_step();
       surface.read_positions(bridge, 0, solver_.walls);
-      std::vector<Vec<2>> increment = surface.displacement();
-      for (std::size_t v = 0; v < increment.size(); ++v)
-        increment[v] -= moved_from_[v];
-      const bridge::InterfaceTotals loads = interface_totals(solver_, increment);
+      const bridge::InterfaceTotals loads =
+          interface_totals(solver_, moved_from_, surface.displacement());
       bridge.report_totals(loads);
       finish_step(loads, bridge.time());
     }

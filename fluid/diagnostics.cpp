@@ -33,8 +33,8 @@ Integrals integrate(const FluidSolver &solver) {
   return total;
 }
 
-bridge::InterfaceTotals interface_totals(const FluidSolver &solver,
-                                         std::span<const Vec<2>> increment) {
+bridge::InterfaceTotals interface_totals(const FluidSolver &solver, std::span<const Vec<2>> start,
+                                         std::span<const Vec<2>> end) {
   const Walls &walls = solver.walls;
   bridge::InterfaceTotals total;
   const auto &samples = solver.quadrature().samples;
@@ -45,14 +45,14 @@ bridge::InterfaceTotals interface_totals(const FluidSolver &solver,
       return (1 - s.t) * v[segment.a] + s.t * v[segment.b];
     };
     const Vec<2> f = s.length * solver.tractions()[k];
-    const Vec<2> x = at(walls.position), moved = at(increment);
+    const Vec<2> x = at(walls.position), from = at(start), to = at(end);
     total.force[0] += f.x();
     total.force[1] += f.y();
     total.force_magnitude += f.norm();
     total.moment[2] += cross(x, f);
     total.moment_magnitude += x.norm() * f.norm();
-    total.work += f.dot(moved);
-    total.work_magnitude += f.norm() * moved.norm();
+    total.work += f.dot(to - from);
+    total.work_magnitude += f.norm() * (from.norm() + to.norm());
   }
   return total;
 }

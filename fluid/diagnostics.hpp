@@ -25,9 +25,9 @@ Integrals integrate(const FluidSolver &solver);
 
 /// Force, moment about the origin and work of the fluid on the coupled walls: the fluid's own
 /// traction integral over its own quadrature, not the nodal forces that the bridge maps.
-/// `increment` is how far each wall vertex has moved in the step [m].
-bridge::InterfaceTotals interface_totals(const FluidSolver &solver,
-                                         std::span<const Vec<2>> increment);
+/// `start` and `end` are the displacements of the wall's vertices at both ends of the step [m].
+bridge::InterfaceTotals interface_totals(const FluidSolver &solver, std::span<const Vec<2>> start,
+                                         std::span<const Vec<2>> end);
 
 /// Centre line of a plate-like coupled wall whose outline runs down one face and up the other.
 class CentreLine {

@@ -61,12 +61,9 @@ private:
 
   // Sums from the solver's own load vector, about the accepted configuration.
   void finish_window(bridge::Participant &bridge) {
-    std::vector<double> positions = surface_.gather(state_.displacement);
-    for (std::size_t k = 0; k < positions.size(); ++k)
-      positions[k] += surface_.mesh.positions[k];
-    bridge.report_totals(
-        bridge::interface_totals(dim, positions, surface_.gather(load_),
-                                 surface_.gather(state_.displacement - start_.displacement)));
+    bridge.report_totals(bridge::interface_totals(
+        dim, surface_.mesh.positions, surface_.gather(load_), surface_.gather(start_.displacement),
+        surface_.gather(state_.displacement)));
     history_.record(start_, state_, load_, bridge.time());
     progress_.update(bridge.time(), history_.note());
   }

@@ -2,7 +2,6 @@
 #include "bridge/launcher/summary.hpp"
 
 #include "bridge/base/check.hpp"
-#include "bridge/launcher/balance.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -84,18 +83,6 @@ void merge_phases(Json &phases, const Json &partial, const std::string &particip
       phases[participant][name] = value;
 }
 
-void add_balance(Json &summary, const fs::path &folder) {
-  const auto balance = interface_balance(folder);
-  if (!balance)
-    return;
-  summary["balance_windows"] = balance->windows;
-  if (balance->windows == 0)
-    return;
-  summary["force_balance_max"] = balance->force;
-  summary["moment_balance_max"] = balance->moment;
-  summary["work_balance_max"] = balance->work;
-}
-
 Json description_of(const Outcome &outcome) {
   return {{"exit_status", outcome.exit_status},
           {"ended", outcome.how_it_ended()},
@@ -145,7 +132,6 @@ bool write_summary(const fs::path &folder, const RunDescription &description,
   summary["wall_time_s"] = outcome.wall_time_s;
   summary["cpu_time_s"] = cpu_time_s;
   summary["phases_ms"] = phases;
-  add_balance(summary, folder);
   summary["participants"] = participants;
 
   const fs::path file = folder / "summary.json";

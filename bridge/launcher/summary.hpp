@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // summary.json of a run, made from the participants' own summaries (fluid_summary.json and
-// solid_summary.json), the interface balance, and what only the launcher knows: how each program
+// solid_summary.json) and what only the launcher knows: how each program
 // ended, wall and CPU time. Scripts rely on its keys; one that does not apply to a run is null.
 #pragma once
 

@@ -116,6 +116,18 @@ TEST(BalanceLog, compares_a_window_when_both_sides_have_reported_it) {
   EXPECT_NEAR(statistics.work_balance_max, 0.003, 1e-12);
 }
 
+TEST(BalanceLog, a_sum_that_is_not_a_number_balances_nothing) {
+  const TemporaryFolder folder;
+  BalanceLog log(folder.path() / "balance.csv");
+  Statistics statistics;
+  InterfaceTotals fluid{{3, 4, 0}, {0, 0, 2}, 0.5, 5, 2, 1}, solid = fluid;
+  solid.moment[2] = std::nan("");
+  log.add_fluid({1, fluid}, statistics);
+  log.add_solid({1, solid}, statistics);
+  EXPECT_EQ(statistics.force_balance_max, 0);
+  EXPECT_TRUE(std::isinf(statistics.moment_balance_max));
+}
+
 TEST(Participant, the_log_has_one_row_per_iteration) {
   const TemporaryFolder folder;
   const Outcome outcome = run_both(Piston(), folder.path(), true);

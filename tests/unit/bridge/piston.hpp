@@ -74,12 +74,7 @@ inline void run_fluid(Participant &bridge, const Piston &piston, const Event &be
     if (!bridge.is_time_window_complete())
       continue;
     bridge.read_data("displacement", 0, moved);
-    std::vector<double> positions(mesh.positions), increments(n);
-    for (std::size_t k = 0; k < n; ++k) {
-      positions[k] += moved[k];
-      increments[k] = moved[k] - displacement[k];
-    }
-    bridge.report_totals(interface_totals(2, positions, force, increments));
+    bridge.report_totals(interface_totals(2, mesh.positions, force, displacement, moved));
   }
   bridge.finalize();
 }
@@ -127,10 +122,7 @@ inline std::vector<double> run_solid(Participant &bridge, const Piston &piston,
       continue;
     }
     history.push_back(d);
-    std::vector<double> positions(mesh.positions);
-    for (std::size_t j = 0; j < n; j += 2)
-      positions[j] += d;
-    bridge.report_totals(interface_totals(2, positions, force, along_x(d - d_old)));
+    bridge.report_totals(interface_totals(2, mesh.positions, force, along_x(d_old), along_x(d)));
   }
   bridge.finalize();
   return history;
