@@ -145,7 +145,8 @@ def call_through_signals(command):
     signal.signal(signal.SIGINT, lambda number, frame: None)
     for number in (signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, lambda received, frame: process.send_signal(received))
-    return process.wait()
+    status = process.wait()
+    return status if status >= 0 else 128 - status  # Popen says -signal
 
 
 def run_script(options, script, folder, output=None):

@@ -12,6 +12,7 @@
 
 #include <CLI/CLI.hpp>
 
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
@@ -35,6 +36,13 @@ struct Options {
   int threads = 0; ///< 0: every core that this process may use
   double grace_s = Deadlines{}.grace_s;
 };
+
+// The reader may be gone (`sluice run ... | head`): neither the run nor its outcome depends on
+// that.
+template <class... Args>
+void say(std::FILE *to, fmt::format_string<Args...> format, Args &&...args) {
+  std::fputs(fmt::format(format, std::forward<Args>(args)...).c_str(), to);
+}
 
 int cores_available() {
   cpu_set_t set;
@@ -85,22 +93,22 @@ std::string indented(const std::string &text) {
 }
 
 void print_failure(const Outcome &outcome) {
-  fmt::print(stderr, "  {}: {}\n", outcome.participant, outcome.how_it_ended());
+  say(stderr, "  {}: {}\n", outcome.participant, outcome.how_it_ended());
   if (!outcome.message.empty())
-    fmt::print(stderr, "{}\n", indented(outcome.message));
+    say(stderr, "{}\n", indented(outcome.message));
   else if (!outcome.was_stopped)
-    fmt::print(stderr, "    (no message)\n");
+    say(stderr, "    (no message)\n");
 }
 
 void report_failures(const RunOutcome &outcome, const Case &scene, const fs::path &folder) {
   if (outcome.signal != 0)
-    fmt::print(stderr, "sluice: {} was stopped by signal {}\n", scene.name, outcome.signal);
+    say(stderr, "sluice: {} was stopped by signal {}\n", scene.name, outcome.signal);
   else
-    fmt::print(stderr, "sluice: {} failed\n", scene.name);
+    say(stderr, "sluice: {} failed\n", scene.name);
   for (const Outcome &participant : outcome.participants)
     if (!participant.ok())
       print_failure(participant);
-  fmt::print(stderr, "  output so far and the logs: {}\n", folder.string());
+  say(stderr, "  output so far and the logs: {}\n", folder.string());
 }
 
 /// A folder of its own under the system's temporary one, gone at the end of the scope.
@@ -125,7 +133,7 @@ private:
 
 void print_check(const Outcome &outcome) {
   if (outcome.ok())
-    fmt::print("{}: OK\n", outcome.participant);
+    say(stdout, "{}: OK\n", outcome.participant);
   else
     print_failure(outcome);
 }
@@ -147,7 +155,7 @@ RunOutcome ask_participants(const std::vector<Participant> &participants, const 
 int report_refusal(const RunOutcome &outcome, const Case &scene) {
   if (outcome.signal != 0)
     return 128 + outcome.signal;
-  fmt::print(stderr, "sluice: {} failed\n", scene.name);
+  say(stderr, "sluice: {} failed\n", scene.name);
   for (const Outcome &participant : outcome.participants)
     if (!participant.ok())
       print_failure(participant);
@@ -163,7 +171,7 @@ int run(const Options &options) {
   const int threads = prepare_environment(options.threads);
   if (const RunOutcome answers = ask_participants(participants, options); !answers.ok())
     return report_refusal(answers, scene);
-  prepare_run_folder(folder, scene.name, options.case_file);
+  const FolderLock lock = prepare_run_folder(folder, scene.name, options.case_file);
 
   RunDescription description{scene.name, fs::absolute(options.case_file).string(),
                              options.overrides, threads, now_utc()};
@@ -179,19 +187,20 @@ int run(const Options &options) {
   deadlines.grace_s = options.grace_s;
   const RunOutcome outcome = run_together(commands, deadlines);
 
-  const fs::path collection = combine_collections(folder, scene.name);
+  if (!outcome.ok())
+    report_failures(outcome, scene, folder); // first: what follows may fail too, on a full disk
   const bool completed = write_summary(folder, description, outcome);
-  if (!outcome.ok()) {
-    report_failures(outcome, scene, folder);
+  const fs::path collection = combine_collections(folder, scene.name);
+  if (!outcome.ok())
     return outcome.signal != 0 ? 128 + outcome.signal : exit_failed;
-  }
   if (!completed) {
-    fmt::print(stderr, "sluice: {} ended before its end time; see {}\n", scene.name,
-               (folder / "summary.json").string());
+    say(stderr,
+        "sluice: {} is not complete: a participant says so, or its summary is broken; see {}\n",
+        scene.name, (folder / "summary.json").string());
     return exit_failed;
   }
-  fmt::print("{}: complete in {:.1f} s, {}\n", scene.name, outcome.wall_time_s,
-             (collection.empty() ? folder / "summary.json" : collection).string());
+  say(stdout, "{}: complete in {:.1f} s, {}\n", scene.name, outcome.wall_time_s,
+      (collection.empty() ? folder / "summary.json" : collection).string());
   return 0;
 }
 
@@ -205,7 +214,7 @@ int check_case(const Options &options) {
     print_check(participant);
   if (!outcome.ok())
     return outcome.signal != 0 ? 128 + outcome.signal : exit_failed;
-  fmt::print("{}: OK\n", options.case_file);
+  say(stdout, "{}: OK\n", options.case_file);
   return 0;
 }
 
@@ -228,6 +237,7 @@ void add_common_options(CLI::App &command, Options &options) {
 
 int main(int argc, char **argv) {
   using namespace sluice::launcher;
+  std::signal(SIGPIPE, SIG_IGN); // a write to a terminal that is gone fails, and that is all
   CLI::App app("Starts every participant of a Sluice case, each as a process of its own.",
                "sluice");
   app.require_subcommand(1);
@@ -249,7 +259,7 @@ int main(int argc, char **argv) {
   try {
     return *run_command ? run(options) : check_case(options);
   } catch (const std::exception &error) {
-    fmt::print(stderr, "sluice: {}\n", error.what());
+    say(stderr, "sluice: {}\n", error.what());
     return exit_failed;
   }
 }

@@ -47,16 +47,22 @@ bool takes_the_largest(std::string_view key) {
 // These are measured here, or need a rule of their own.
 bool is_not_copied(std::string_view key) {
   return key == "wall_time_s" || key == "cpu_time_s" || key == "phases_ms" || key == "completed" ||
-         key == "message";
+         key == "message" || key == "note";
 }
 
+// One that is half written must not hide how the run ended: it counts as incomplete, with a note.
 Json read_partial(const fs::path &file) {
   std::ifstream in(file);
   if (!in)
     return Json::object(); // the participant died before it wrote one
   Json partial = Json::parse(in, nullptr, false);
-  check(partial.is_object(), "{}: is not a JSON object; was the disk full?", file.string());
-  return partial;
+  if (partial.is_object())
+    return partial;
+  return {
+      {"completed", false},
+      {"note", fmt::format("{}: is not a JSON object; did the participant die while it wrote it, "
+                           "or was the disk full?",
+                           file.string())}};
 }
 
 void merge_values(Json &summary, const Json &partial) {
@@ -126,6 +132,7 @@ bool write_summary(const fs::path &folder, const RunDescription &description,
         merge_phases(phases, partial, name);
         completed = completed && partial.value("completed", true);
         participants[name] = description_of(participant);
+        participants[name]["note"] = partial.value("note", "");
       }
 
   summary["completed"] = completed;

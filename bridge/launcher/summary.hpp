@@ -21,7 +21,7 @@ struct RunDescription {
 };
 
 /// Writes DIR/summary.json; returns whether the run is complete: every participant ended with
-/// status 0 and none of the partial summaries says otherwise.
+/// status 0 and none of the partial summaries says otherwise or is broken (participants.X.note).
 bool write_summary(const std::filesystem::path &folder, const RunDescription &description,
                    const RunOutcome &outcome);
 

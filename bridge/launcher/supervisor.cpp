@@ -23,9 +23,8 @@ namespace sluice::launcher {
 
 std::string Outcome::how_it_ended() const {
   const std::string by_us = was_stopped ? ", stopped by sluice" : "";
-  if (exit_status > 128)
-    return fmt::format("ended by signal {} ({}){}", exit_status - 128, strsignal(exit_status - 128),
-                       by_us);
+  if (signal != 0)
+    return fmt::format("ended by signal {} ({}){}", signal, strsignal(signal), by_us);
   return fmt::format("exit status {}{}", exit_status, by_us);
 }
 
@@ -40,6 +39,7 @@ namespace {
 class SignalQueue {
 public:
   SignalQueue() {
+    std::signal(SIGCHLD, SIG_DFL); // inherited as ignored, no child would ever be reported
     sigset_t set{};
     sigemptyset(&set);
     for (const int s : {SIGINT, SIGTERM, SIGHUP, SIGCHLD})
@@ -88,6 +88,7 @@ struct Child {
   dup2(nothing, STDIN_FILENO);
   dup2(relay.log(), STDOUT_FILENO);
   dup2(relay.write_end(), STDERR_FILENO);
+  std::signal(SIGPIPE, SIG_DFL); // ignored by us, see main
   sigprocmask(SIG_SETMASK, &mask, nullptr);
   std::vector<char *> argv{const_cast<char *>(command.program.c_str())};
   for (const std::string &argument : command.arguments)
@@ -140,8 +141,9 @@ private:
       if (child->relay.read_end() >= 0)
         files.push_back({child->relay.read_end(), POLLIN, 0});
     int timeout_ms = -1;
-    if (stop_at_s_)
-      timeout_ms = std::max(0, static_cast<int>(1000 * (*stop_at_s_ - watch_.seconds())) + 1);
+    if (stop_at_s_) // a long wait is cut into hours: poll counts in an int
+      timeout_ms = static_cast<int>(
+          std::clamp(1000 * (*stop_at_s_ - watch_.seconds()) + 1, 0.0, 3'600'000.0));
     poll(files.data(), files.size(), timeout_ms);
   }
 
@@ -156,7 +158,8 @@ private:
   void reap() {
     int status = 0;
     rusage usage{};
-    for (pid_t pid; (pid = wait4(-1, &status, WNOHANG, &usage)) > 0;) {
+    pid_t pid = 0;
+    while ((pid = wait4(-1, &status, WNOHANG, &usage)) > 0) {
       const auto child = std::find_if(running_.begin(), running_.end(),
                                       [&](const auto &c) { return c->pid == pid; });
       if (child == running_.end())
@@ -164,6 +167,8 @@ private:
       record(**child, status, usage);
       running_.erase(child);
     }
+    check(pid == 0 || running_.empty(), "sluice: its participants are gone, nobody knows how ({})",
+          std::strerror(errno));
   }
 
   void record(Child &child, int status, const rusage &usage) {
@@ -174,7 +179,8 @@ private:
     };
     Outcome outcome;
     outcome.participant = child.command.participant;
-    outcome.exit_status = WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status);
+    outcome.signal = WIFSIGNALED(status) ? WTERMSIG(status) : 0;
+    outcome.exit_status = outcome.signal != 0 ? 128 + outcome.signal : WEXITSTATUS(status);
     outcome.was_stopped = child.was_stopped;
     outcome.cpu_time_s = seconds(usage.ru_utime) + seconds(usage.ru_stime);
     outcome.peak_memory_mb = static_cast<double>(usage.ru_maxrss) / 1024;

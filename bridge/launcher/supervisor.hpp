@@ -28,6 +28,7 @@ struct Command {
 struct Outcome {
   std::string participant;
   int exit_status = 0;      ///< of the program; 128 + signal when a signal ended it
+  int signal = 0;           ///< that ended it, or 0
   bool was_stopped = false; ///< by us, because another participant failed or we were told to
   double cpu_time_s = 0;
   double peak_memory_mb = 0;

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 import contextlib
 import io
+import signal
 import subprocess
 import tempfile
 import unittest
@@ -50,6 +51,15 @@ class ArgumentsTest(unittest.TestCase):
 
 
 class ScriptTest(unittest.TestCase):
+    def test_launcher_that_a_signal_ends_gives_128_and_the_signal(self):
+        handlers = {number: signal.getsignal(number)
+                    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
+        for number, handler in handlers.items():
+            self.addCleanup(signal.signal, number, handler)
+        self.assertEqual(run_case.call_through_signals(["sh", "-c", "kill -KILL $$"]),
+                         128 + signal.SIGKILL)
+        self.assertEqual(run_case.call_through_signals(["sh", "-c", "exit 3"]), 3)
+
     def test_command_works_from_any_folder(self):
         with tempfile.TemporaryDirectory() as elsewhere:
             done = subprocess.run([str(paths.CASES / "run"), "--help"], cwd=elsewhere,

@@ -65,6 +65,13 @@ class LauncherTest(unittest.TestCase):
     def summary(self):
         return json.loads((self.out / "summary.json").read_text())
 
+    def wait_for(self, *names):
+        for _ in range(200):
+            if all((self.out / name).exists() for name in names):
+                return
+            time.sleep(0.02)
+        self.fail(f"{names} did not appear")
+
 
 class CompleteRunTest(LauncherTest):
     def test_both_participants_run_and_the_summaries_are_merged(self):
@@ -124,13 +131,62 @@ class CompleteRunTest(LauncherTest):
         self.assertFalse((self.out / "solid.log").exists())
 
     def test_output_of_an_earlier_run_is_removed_and_other_files_stay(self):
-        self.out.mkdir()
-        for name in ("tip.csv", "fluid_000010.vtp", "summary.json", "mine.csv", "notes.txt"):
-            (self.out / name).write_text("old")
+        theirs = {"mine.csv", "notes.txt", "fluid_state.h5"}  # a run may start from the last one
         self.run_case()
+        for name in {"tip.csv", "fluid_000010.vtp"} | theirs:
+            (self.out / name).write_text("old")
+        self.assertEqual(self.run_case().returncode, 0)
         left = {p.name for p in self.out.iterdir()}
-        self.assertTrue({"mine.csv", "notes.txt", "case.toml"} <= left)
+        self.assertTrue(theirs | {"case.toml"} <= left)
         self.assertTrue({"tip.csv", "fluid_000010.vtp"}.isdisjoint(left))
+
+    def test_folder_that_no_run_has_made_keeps_its_files_and_is_refused(self):
+        self.out.mkdir()
+        (self.out / "tip.csv").write_text("mine")
+        done = self.run_case()
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f"{self.out}/tip.csv: has the name of a run's file", done.stderr)
+        self.assertEqual([p.name for p in self.out.iterdir()], ["tip.csv"])
+
+    def test_case_file_in_the_run_folder_stays_as_it_is(self):
+        self.out.mkdir()
+        self.case = self.out / "case.toml"
+        for text in (CASE, CASE + "# edited between the runs\n"):
+            self.case.write_text(text)
+            self.assertEqual(self.run_case().returncode, 0)
+            self.assertEqual(self.case.read_text(), text)
+
+    def test_second_run_into_the_same_folder_is_refused_and_the_first_completes(self):
+        self.program("fluid", WELL + "touch $out/started; while [ ! -e $out/go ]; do sleep 0.02; done\n")
+        first = subprocess.Popen(self.command("run", "--out", str(self.out)),
+                                 stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        self.wait_for("started")
+        second = self.run_case()
+        (self.out / "go").touch()
+        _, said = first.communicate(timeout=20)
+        self.assertEqual(second.returncode, 1)
+        self.assertIn("another sluice run writes into this folder", second.stderr)
+        self.assertEqual(first.returncode, 0, said)
+        self.assertTrue(self.summary()["completed"])
+
+    def test_reader_of_the_messages_may_leave(self):
+        for script, status in ((WELL, 0), ("exit 1\n", 1)):
+            self.program("fluid", "for k in $(seq 100); do echo noise >&2; done\n" + script)
+            running = subprocess.Popen(self.command("run", "--out", str(self.out)),
+                                       stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+            running.stdout.close()
+            running.stderr.close()
+            self.assertEqual(running.wait(timeout=20), status)
+            self.assertEqual(self.summary()["completed"], status == 0)
+
+    def test_participants_get_the_usual_end_of_a_broken_pipe(self):
+        self.program("fluid", WELL + "yes | head -1 > /dev/null; echo ${PIPESTATUS[0]} >&2\n")
+        self.run_case()
+        self.assertEqual((self.out / "fluid.log").read_text(), f"{128 + signal.SIGPIPE}\n")
+
+    def test_children_are_awaited_where_their_end_was_ignored_before(self):
+        ignored = lambda: signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+        self.assertEqual(self.run_case(preexec_fn=ignored).returncode, 0)
 
     def test_collections_become_one_with_a_part_each(self):
         for part, instant in (("fluid", "0.5"), ("solid", "0.50000000000000011")):
@@ -169,6 +225,37 @@ class FailedRunTest(LauncherTest):
         self.assertIn("fluid: ended by signal 15 (Terminated), stopped by sluice", done.stderr)
         self.assertLess(time.monotonic() - started, 4)
 
+    def test_very_long_grace_is_waited_for_without_spinning(self):
+        self.program("fluid", "sleep 0.5; echo 'sluice-fluid: partner solid is gone' >&2; exit 1\n")
+        self.program("solid", "exit 1\n")
+        before = os.times()
+        done = self.run_case("--grace", "3000000")
+        self.assertIn("sluice-fluid: partner solid is gone", done.stderr)
+        # Half a second of waiting: a loop without poll's sleep would take it all.
+        after = os.times()
+        cpu = after.children_user + after.children_system \
+            - before.children_user - before.children_system
+        self.assertLess(cpu, 0.4)
+
+    def test_exit_status_255_is_no_signal(self):
+        self.program("solid", "exit 255\n")
+        self.assertIn("solid: exit status 255", self.run_case("--grace", "5").stderr)
+
+    def test_half_written_summary_does_not_hide_the_failure(self):
+        self.program("solid", "echo '{\"steps\": ' > $out/solid_summary.json\n"
+                     "echo 'sluice-solid: element 7 is inverted' >&2; exit 4\n")
+        done = self.run_case()
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("sluice-solid: element 7 is inverted", done.stderr)
+        solid = self.summary()["participants"]["solid"]
+        self.assertEqual(solid["exit_status"], 4)
+        self.assertIn("solid_summary.json: is not a JSON object", solid["note"])
+
+    def test_run_with_a_half_written_summary_is_not_complete(self):
+        self.program("solid", "echo '{' > $out/solid_summary.json\n")
+        self.assertEqual(self.run_case().returncode, 1)
+        self.assertFalse(self.summary()["completed"])
+
     def test_crash_is_named_by_its_signal(self):
         self.program("solid", "kill -SEGV $$\n")
         done = self.run_case("--grace", "5")
@@ -176,13 +263,17 @@ class FailedRunTest(LauncherTest):
 
     def test_failed_run_is_not_judged_by_the_summary_of_the_one_before(self):
         self.run_case()
-        self.program("fluid", "exit 1\n")
+        self.assertEqual(self.summary()["steps"], 3)
+        for part in ("fluid", "solid"):
+            self.program(part, "exit 1\n")
         self.run_case()
         self.assertFalse(self.summary()["completed"])
+        self.assertIsNone(self.summary()["steps"])
 
     def test_signal_reaches_both_and_what_they_started(self):
         for part in ("fluid", "solid"):
-            self.program(part, f"touch $out/{part}_started; sleep 60 & wait\n")
+            self.program(part, f"sleep 60 & echo $! > $out/{part}_number; "
+                         f"mv $out/{part}_number $out/{part}_started; wait\n")
         running = subprocess.Popen(self.command("run", "--out", str(self.out)),
                                    stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
         self.wait_for("fluid_started", "solid_started")
@@ -191,9 +282,11 @@ class FailedRunTest(LauncherTest):
         self.assertEqual(running.returncode, 128 + signal.SIGINT)
         self.assertIn("was stopped by signal 2", said)
         self.assertFalse(self.summary()["completed"])
+        for part in ("fluid", "solid"):
+            self.assertTrue(self.ends(int((self.out / f"{part}_started").read_text())))
 
     def test_participants_do_not_outlive_a_killed_launcher(self):
-        self.program("fluid", "echo $$ > $out/started; exec sleep 60\n")
+        self.program("fluid", "echo $$ > $out/number; mv $out/number $out/started; exec sleep 60\n")
         running = subprocess.Popen(self.command("run", "--out", str(self.out)),
                                    stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         self.wait_for("started")
@@ -201,14 +294,6 @@ class FailedRunTest(LauncherTest):
         running.kill()
         running.wait()
         self.assertTrue(self.ends(number))
-
-    def wait_for(self, *names):
-        for _ in range(200):
-            if all((self.out / name).exists() and
-                   (name != "started" or (self.out / name).read_text()) for name in names):
-                return
-            time.sleep(0.02)
-        self.fail(f"{names} did not appear")
 
     def ends(self, number):
         for _ in range(100):
