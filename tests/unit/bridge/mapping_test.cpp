@@ -162,8 +162,8 @@ TEST(FaceTree, agrees_with_the_search_over_all_faces) {
     double nearest = 1e9;
     for (std::size_t f = 0; f < solid.n_faces(); ++f) {
       const auto a = solid.position(f), b = solid.position(f + 1);
-      nearest = std::min(
-          nearest, project_on_segment<2>(p, {a[0], a[1]}, {b[0], b[1]}).distance_squared);
+      nearest =
+          std::min(nearest, project_on_segment<2>(p, {a[0], a[1]}, {b[0], b[1]}).distance_squared);
     }
     EXPECT_NEAR(tree.nearest({p.x(), p.y(), 0}).projection.distance_squared, nearest, 1e-17);
   }
@@ -186,6 +186,26 @@ TEST(Projection, finds_the_nearest_point_of_a_warped_quadrilateral) {
     EXPECT_LE(found.distance_squared, nearest + 1e-12);
     EXPECT_NEAR(found.weights[0] + found.weights[1] + found.weights[2] + found.weights[3], 1,
                 1e-15);
+  }
+}
+
+// The distance of the face from the origin must not decide whether a point is found on it.
+TEST(Projection, finds_the_point_of_a_small_quadrilateral_far_from_the_origin) {
+  const double size = 2.8e-3, r = 0.3, s = 0.6; // [m], -, -
+  const std::array<double, 4> weights{(1 - r) * (1 - s), r * (1 - s), r * s, (1 - r) * s};
+  for (const double offset : {0.0, 1.0, 10.0}) {
+    const Vec<3> o(offset, offset, offset);
+    const std::array<Vec<3>, 4> x{o, o + size * Vec<3>(1, 0, 0.1), o + size * Vec<3>(1.1, 1, 0.2),
+                                  o + size * Vec<3>(0, 0.9, 0.1)};
+    Vec<3> p = Vec<3>::Zero();
+    for (std::size_t a = 0; a < 4; ++a)
+      p += weights[a] * x[a];
+    // Four products and sums of numbers as large as the offset, seen from a face of that size.
+    const double rounding = 16 * 1e-16 * (1 + offset / size);
+    const Projection found = project_on_quadrilateral(p, x);
+    for (std::size_t a = 0; a < 4; ++a)
+      EXPECT_NEAR(found.weights[a], weights[a], rounding) << "at " << offset << " m";
+    EXPECT_LE(std::sqrt(found.distance_squared), rounding * size);
   }
 }
 
