@@ -70,24 +70,24 @@ std::unique_ptr<Link> make_link(Role role, const BridgeSettings &settings,
                                 settings.silence_deadline);
 }
 
-void greet(Role role, Link &link, const std::string &token) {
+void greet(Role role, Link &link, const std::string &token, Deadline deadline) {
+  link.distrust(deadline);
   if (role == Role::solid)
     send_hello(link, role, token);
   check_partner(link, role, token);
   if (role == Role::fluid)
     send_hello(link, role, token);
+  link.trust();
 }
 
 // A stranger gets a short deadline of its own, so that it cannot keep the partner out.
 std::unique_ptr<Link> accept_partner(Listener &listener, const BridgeSettings &settings,
                                      Deadline deadline, std::string &last_refusal) {
   while (auto transport = listener.accept(deadline)) {
-    BridgeSettings patient = settings;
-    patient.silence_deadline = std::min(settings.silence_deadline, stranger_patience);
     try {
-      auto link = make_link(Role::fluid, patient, std::move(transport));
-      greet(Role::fluid, *link, token_of(settings));
-      link->be_patient(settings.silence_deadline);
+      auto link = make_link(Role::fluid, settings, std::move(transport));
+      greet(Role::fluid, *link, token_of(settings),
+            std::min(deadline, deadline_in(stranger_patience)));
       return link;
     } catch (const UserError &error) {
       last_refusal = fmt::format("; the last one that came was turned away: {}", error.what());
@@ -181,7 +181,7 @@ std::unique_ptr<Link> connect_to_partner(Role role, const BridgeSettings &settin
 std::unique_ptr<Link> greet_partner(Role role, const BridgeSettings &settings,
                                     std::unique_ptr<Transport> transport) {
   auto link = make_link(role, settings, std::move(transport));
-  greet(role, *link, token_of(settings));
+  greet(role, *link, token_of(settings), deadline_in(settings.connect_deadline));
   return link;
 }
 

@@ -23,8 +23,8 @@ Role partner_of(Role role);
 std::string token_of(const BridgeSettings &settings);
 
 /// The fluid listens and turns away whoever does not show the token and the role "solid"; the solid
-/// retries until somebody listens. Throws UserError when connect_deadline passes or the partner
-/// refuses, naming the address.
+/// retries until somebody listens. Throws UserError when connect_deadline passes (at the solid: to
+/// connect, and once more to be greeted) or the partner refuses, naming the address.
 std::unique_ptr<Link> connect_to_partner(Role role, const BridgeSettings &settings,
                                          const std::filesystem::path &out_dir);
 /// The same over a transport that is connected already.

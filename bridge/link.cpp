@@ -60,7 +60,7 @@ void Link::send_frame(FrameType type, std::span<const std::byte> payload, double
   const Bytes frame = encode_frame(type, sent_, payload);
   std::span<const std::byte> rest(frame);
   while (!rest.empty()) {
-    const std::size_t n = transport_->write_some(rest, deadline_in(patience));
+    const std::size_t n = transport_->write_some(rest, wait_until(patience));
     if (n == 0)
       throw Silence();
     rest = rest.subspan(n);
@@ -102,6 +102,8 @@ Bytes Link::receive_bytes(FrameType expected, std::size_t limit, std::string_vie
   } catch (const ConnectionLost &lost) {
     report_loss(activity, lost.what());
   } catch (const Silence &) {
+    check(!greeting_deadline_, "bridge: no complete greeting came in time while the {} {}", self_,
+          activity);
     fail("bridge: the {} was silent for {} s (not even a heartbeat) while the {} {}; it is stopped "
          "or unreachable (bridge.silence_deadline_s)",
          partner_, silence_deadline_, self_, activity);
@@ -119,7 +121,7 @@ Bytes Link::next_frame(FrameType expected, std::size_t limit, std::string_view a
       report_abort(payload, activity);
     if (header.type == expected)
       return payload;
-    if (header.type != FrameType::heartbeat)
+    if (header.type != FrameType::heartbeat || greeting_deadline_)
       throw MalformedMessage(
           fmt::format("a {} frame came instead of {}", name_of(header.type), name_of(expected)));
   }
@@ -152,12 +154,17 @@ Bytes Link::read_payload(const FrameHeader &header, std::size_t limit) {
 
 void Link::read_all(std::span<std::byte> bytes) {
   while (!bytes.empty()) {
-    const std::size_t n = transport_->read_some(bytes, deadline_in(silence_deadline_));
+    const std::size_t n = transport_->read_some(bytes, wait_until(silence_deadline_));
     if (n == 0)
       throw Silence();
     bytes = bytes.subspan(n);
     bytes_received_ += n;
   }
+}
+
+Deadline Link::wait_until(double patience) const {
+  const Deadline deadline = deadline_in(patience);
+  return greeting_deadline_ ? std::min(deadline, *greeting_deadline_) : deadline;
 }
 
 void Link::report_abort(std::span<const std::byte> payload, std::string_view activity) const {

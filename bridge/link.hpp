@@ -10,6 +10,7 @@
 #include <condition_variable>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
@@ -26,8 +27,10 @@ public:
   Link(const Link &) = delete;
   Link &operator=(const Link &) = delete;
 
-  /// Another silence deadline [s] from now on.
-  void be_patient(double silence_deadline) { silence_deadline_ = silence_deadline; }
+  /// Whatever trickles in, every wait ends by `deadline`, and a heartbeat is no greeting: for a
+  /// connection that may be a stranger's. Until `trust`.
+  void distrust(Deadline deadline) { greeting_deadline_ = deadline; }
+  void trust() { greeting_deadline_.reset(); }
 
   /// From now on a thread sends a heartbeat five times per silence deadline (once a second at
   /// least), whatever this side computes.
@@ -67,6 +70,7 @@ private:
   FrameHeader read_header();
   Bytes read_payload(const FrameHeader &header, std::size_t limit);
   void read_all(std::span<std::byte> bytes);
+  Deadline wait_until(double patience) const;
   [[noreturn]] void report_abort(std::span<const std::byte> payload,
                                  std::string_view activity) const;
   [[noreturn]] void report_malformed(std::string_view awaited, const MalformedMessage &error) const;
@@ -75,6 +79,7 @@ private:
   std::unique_ptr<Transport> transport_;
   std::string self_, partner_;
   double silence_deadline_;
+  std::optional<Deadline> greeting_deadline_;
   double wait_s_ = 0;
   std::atomic<std::uint64_t> bytes_sent_ = 0; // by both threads
   std::uint64_t bytes_received_ = 0;

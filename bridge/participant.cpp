@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <optional>
+#include <utility>
 
 namespace sluice::bridge {
 
@@ -14,7 +15,7 @@ class Participant::Impl {
 public:
   Impl(const std::string &name, const Config &config, std::filesystem::path folder,
        std::unique_ptr<Transport> connected)
-      : role(role_of(name)), case_text(config.canonical_text()),
+      : role(role_of(name)), case_text(config.canonical_text("bridge.token")),
         settings(config.read<BridgeSettings>("bridge")),
         case_settings(config.read<CaseSettings>("case")), clock(case_settings),
         out_dir(std::move(folder)), transport(std::move(connected)) {
@@ -61,6 +62,7 @@ public:
     check(std::isfinite(dt) && dt > 0 && dt <= clock.left() * (1 + 1e-9),
           "bridge: a step of {} s, where {} s of window {} are left", dt, clock.left(),
           clock.window());
+    enter_window();
     is_complete = is_rejected = false;
     if (!clock.step(dt))
       return;
@@ -78,7 +80,12 @@ public:
     is_complete = true;
     iteration = 1;
     clock.next_window();
-    if (!clock.is_over())
+    must_enter_window = !clock.is_over();
+  }
+  // Not in the advance before: a partner that dies in this window must not cost the last one, which
+  // the caller has not seen as complete yet.
+  void enter_window() {
+    if (std::exchange(must_enter_window, false))
       side->await_window(exchange());
   }
   void repeat_window() {
@@ -103,6 +110,7 @@ public:
   int iteration = 1;
   bool is_complete = false;
   bool is_rejected = false;
+  bool must_enter_window = false;
   bool is_silent = false; // goodbye or abort said
 };
 
@@ -185,6 +193,7 @@ void Participant::read_data(std::string_view field, double relative_time,
     const WindowField &window = field_of(impl_->side->readable, field, impl_->role, "reads");
     check(impl_->link != nullptr, "bridge: read_data follows initialize");
     check_size(field, values.size(), impl_->mesh);
+    impl_->enter_window();
     const WindowClock &clock = impl_->clock;
     const double length = clock.is_over() ? 1 : clock.window_length();
     const double s = clock.is_over() ? 0 : (clock.elapsed() + relative_time) / length;

@@ -79,11 +79,13 @@ public:
   void write_data(std::string_view field, std::span<const double> values);
   /// The partner's field at `relative_time` [s] after the current time: in a window of length dt
   /// 0 gives the value at its start, dt the current iterate at its end, linear in between. The
-  /// force at the start of the first window is the initial one (zero unless written).
+  /// force at the start of the first window is the initial one (zero unless written). The solid's
+  /// first call in a window waits for the fluid's forces.
   void read_data(std::string_view field, double relative_time, std::span<double> values) const;
 
   /// Ends a step of length dt <= max_time_step_size() [s]. At the end of the window exchanges data
-  /// with the partner and waits for it; before that (sub-steps) only moves the time on.
+  /// with the partner and waits for it; before that (sub-steps) only moves the time on. A window
+  /// that converged is complete when this returns, whatever becomes of the partner afterwards.
   void advance(double dt);
   /// Says goodbye. The partner's early end is an error until then.
   void finalize();

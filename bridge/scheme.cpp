@@ -93,13 +93,21 @@ void Scheme::iterate_again(const InterfaceState &solved, double dt, IterationRec
       accelerate(acceleration_, stacked(iterate_, dt), stacked(solved, dt), resolution(solved, dt));
   record.relaxation = result.relaxation;
   record.columns = result.columns;
-  if (!result.next.allFinite())
+  if (!result.next.allFinite()) {
     record.verdict = Verdict::failed;
+    return;
+  }
   iterate_ = unstacked(result.next, dt);
   ++iteration_;
 }
 
 std::string Scheme::explanation(const IterationRecord &record) const {
+  if (iteration_ < settings_.max_iterations) // the only other way to fail
+    return fmt::format(
+        "has no finite iterate to follow iteration {}: the values grew beyond what a "
+        "double holds (force change {:.3g}); a smaller case.time_step_s or a "
+        "bridge.initial_relaxation below {} may help",
+        iteration_, record.force_residual, settings_.initial_relaxation);
   return fmt::format(
       "did not converge in {} iterations (bridge.max_iterations = {}): displacement residual "
       "{:.3g} "

@@ -4,6 +4,7 @@
 
 #include "bridge/base/config.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 
@@ -19,11 +20,19 @@ struct CaseSettings {
   template <class Reader> void describe(Reader &read) {
     read("name", name, "name of the case");
     read.required("end_time_s", end_time, "time at which the run ends").positive();
-    read.required("time_step_s", time_step, "length of one coupling window").positive();
+    read.required("time_step_s", time_step, "length of one coupling window")
+        .positive()
+        .check(windows() >= 1 && windows() <= most_windows,
+               fmt::format("makes {:.3g} windows until end_time_s = {}; 1 to {:.0e} are possible",
+                           windows(), end_time, most_windows));
     read("output_interval_s", output_interval, "time between written fields").at_least(0);
   }
   /// Number of windows; the last one is shorter when end_time is no multiple of time_step.
-  long n_windows() const { return std::lround(std::ceil(end_time / time_step - 1e-6)); }
+  long n_windows() const { return std::lround(windows()); }
+
+private:
+  static constexpr double most_windows = 1e9; // months of computing; far from what a long holds
+  double windows() const { return std::max(0.0, std::ceil(end_time / time_step - 1e-6)); }
 };
 
 /// Table [bridge]: how the participants talk, and how a window is iterated.

@@ -37,8 +37,8 @@ public:
   virtual ~Side() = default;
   /// Exchanges meshes (returned: the partner's) and initial data.
   virtual InterfaceMesh initialize(Link &link, const InterfaceMesh &own) = 0;
-  /// Called once after initialize, and after every completed window but the last: the solid waits
-  /// here for the fluid's forces.
+  /// Called once after initialize, and in every later window before its data are read or it is
+  /// advanced: the solid waits here for the fluid's forces.
   virtual void await_window(const Exchange &) {}
   /// At the end of an iteration; throws UserError for a window that fails.
   virtual Verdict advance(const Exchange &exchange) = 0;
@@ -51,7 +51,7 @@ public:
 };
 
 std::unique_ptr<Side> make_fluid_side(const BridgeSettings &settings);
-/// Logs its iterations in `out_dir`/coupling.csv.
+/// Logs its iterations in `out_dir`/coupling.csv, from initialize on.
 std::unique_ptr<Side> make_solid_side(const BridgeSettings &settings,
                                       const std::filesystem::path &out_dir);
 

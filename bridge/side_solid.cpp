@@ -22,9 +22,7 @@ void write_motion(PayloadWriter &write, const InterfaceState &state) {
 class SolidSide final : public Side {
 public:
   SolidSide(const BridgeSettings &settings, const std::filesystem::path &out_dir)
-      : settings_(settings),
-        log_(out_dir / "coupling.csv", "window,iteration,time_s,displacement_residual,"
-                                       "force_residual,relaxation,columns,converged"),
+      : settings_(settings), log_file_(out_dir / "coupling.csv"),
         balance_(out_dir / "balance.csv") {}
 
   InterfaceMesh initialize(Link &link, const InterfaceMesh &own) override {
@@ -36,6 +34,9 @@ public:
     PayloadWriter payload;
     write_motion(payload, scheme_->accepted());
     link.send(FrameType::initial, payload);
+    // Only now: a partner that never comes must not cost the log of an earlier run.
+    log_.emplace(log_file_, "window,iteration,time_s,displacement_residual,force_residual,"
+                            "relaxation,columns,converged");
     return fluid;
   }
 
@@ -130,14 +131,16 @@ private:
   }
 
   void log(const Exchange &exchange, const IterationRecord &record) {
-    log_.row({static_cast<double>(exchange.clock.window()), static_cast<double>(exchange.iteration),
-              exchange.clock.start() + exchange.clock.window_length(), record.displacement_residual,
-              record.force_residual, record.relaxation, static_cast<double>(record.columns),
-              record.verdict == Verdict::converged ? 1.0 : 0.0});
+    log_->row(
+        {static_cast<double>(exchange.clock.window()), static_cast<double>(exchange.iteration),
+         exchange.clock.start() + exchange.clock.window_length(), record.displacement_residual,
+         record.force_residual, record.relaxation, static_cast<double>(record.columns),
+         record.verdict == Verdict::converged ? 1.0 : 0.0});
   }
 
   BridgeSettings settings_;
-  CsvWriter log_;
+  std::filesystem::path log_file_;
+  std::optional<CsvWriter> log_;
   BalanceLog balance_;
   std::optional<Scheme> scheme_;
   MapReport report_;

@@ -67,10 +67,14 @@ Address tcp_address(const BridgeSettings &settings, const std::filesystem::path 
   const auto colon = settings.address.rfind(':');
   check(colon != std::string::npos && colon > 0 && colon + 1 < settings.address.size(),
         "bridge.address '{}': expected host:port, for example 127.0.0.1:20500", settings.address);
+  const std::string port = settings.address.substr(colon + 1);
+  const bool is_number = port.find_first_not_of("0123456789") == std::string::npos;
+  check(!is_number || (port.size() <= 5 && std::stoi(port) >= 1 && std::stoi(port) <= 65535),
+        "bridge.address '{}': a port lies between 1 and 65535", settings.address);
   std::string host = settings.address.substr(0, colon);
   if (host.size() > 2 && host.front() == '[' && host.back() == ']')
     host = host.substr(1, host.size() - 2);
-  return {Address::Family::tcp, "", host, settings.address.substr(colon + 1)};
+  return {Address::Family::tcp, "", host, port};
 }
 
 // ---- sockets ------------------------------------------------------------------------------------
@@ -128,8 +132,10 @@ private:
   SocketHandle socket_;
 };
 
+constexpr int socket_type = SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK;
+
 SocketHandle open_socket(int family) {
-  SocketHandle socket(::socket(family, SOCK_STREAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  SocketHandle socket(::socket(family, socket_type, 0));
   check(socket.is_open(), "a socket cannot be opened: {}", system_text(errno));
   return socket;
 }
@@ -209,19 +215,25 @@ SocketHandle listen_unix(const std::string &path) {
   return socket;
 }
 
+// A name may stand for several addresses (localhost: ::1 and 127.0.0.1): the first that this host
+// has; whoever connects tries them all, and must not meet another run at an earlier one.
 SocketHandle listen_tcp(const Address &address, const std::string &token) {
   const auto list = resolve(address);
-  check(!token.empty() || is_loopback(*list),
-        "bridge.address {} can be reached from other hosts; set bridge.token (or SLUICE_TOKEN on "
-        "both hosts) so that only the partner is let in",
-        address.text());
-  SocketHandle socket = open_socket(list->ai_family);
-  const int on = 1;
-  ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
-  check(::bind(socket.get(), list->ai_addr, list->ai_addrlen) == 0,
-        "bridge.address {}: cannot listen there: {}; end the other run or give another address",
-        address.text(), system_text(errno));
-  return socket;
+  int error = 0;
+  for (const addrinfo *entry = list.get(); entry && error != EADDRINUSE; entry = entry->ai_next) {
+    check(!token.empty() || is_loopback(*entry),
+          "bridge.address {} can be reached from other hosts; set bridge.token (or SLUICE_TOKEN on "
+          "both hosts) so that only the partner is let in",
+          address.text());
+    SocketHandle socket(::socket(entry->ai_family, socket_type, 0));
+    const int on = 1;
+    ::setsockopt(socket.get(), SOL_SOCKET, SO_REUSEADDR, &on, sizeof on);
+    if (socket.is_open() && ::bind(socket.get(), entry->ai_addr, entry->ai_addrlen) == 0)
+      return socket;
+    error = errno;
+  }
+  fail("bridge.address {}: cannot listen there: {}; end the other run or give another address",
+       address.text(), system_text(error));
 }
 
 } // namespace
@@ -313,10 +325,17 @@ std::unique_ptr<Transport> try_connect(const Address &address, Deadline deadline
     return finished(std::move(socket), error, address);
   }
   const auto list = resolve(address);
-  SocketHandle socket = open_socket(list->ai_family);
-  send_at_once(socket.get());
-  const int error = connect_error(socket.get(), list->ai_addr, list->ai_addrlen, deadline);
-  return finished(std::move(socket), error, address);
+  int error = 0;
+  for (const addrinfo *entry = list.get(); entry; entry = entry->ai_next) {
+    SocketHandle socket(::socket(entry->ai_family, socket_type, 0));
+    error = socket.is_open()
+                ? connect_error(socket.get(), entry->ai_addr, entry->ai_addrlen, deadline)
+                : errno;
+    send_at_once(socket.get());
+    if (error == 0)
+      return std::make_unique<SocketTransport>(std::move(socket));
+  }
+  return finished(SocketHandle(), error, address);
 }
 
 } // namespace sluice::bridge

@@ -19,6 +19,7 @@ struct Options {
 void run(const Options &options) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
+  config.allow_tables({"case", "bridge", "fluid", "fluid.wall", "fluid.gauge", "solid"});
   if (options.threads > 0)
     fluid::set_number_of_threads(options.threads);
   if (options.check_only) {

@@ -3,6 +3,7 @@
 
 #include "bridge/base/progress.hpp"
 #include "bridge/settings.hpp"
+#include "bridge/window_clock.hpp"
 #include "solid-dealii/history.hpp"
 
 #include <nlohmann/json.hpp>
@@ -56,12 +57,12 @@ void run_release(SolidSolver<dim> &s, const Hydrostatic &water,
   SolidState state = s.initial_state();
   state.acceleration = s.consistent_acceleration(state, load);
   double highest = 0;
-  for (long window = 1; window <= settings.n_windows(); ++window) {
+  for (bridge::WindowClock clock(settings); !clock.is_over();) {
     const SolidState start = state;
-    state = s.step(start, load, settings.time_step);
-    const double time = static_cast<double>(window) * settings.time_step;
-    history.record(start, state, load, time);
-    progress.update(time, history.note());
+    state = s.step(start, load, clock.window_length());
+    clock.next_window();
+    history.record(start, state, load, clock.time());
+    progress.update(clock.time(), history.note());
     highest = std::max(highest, tip_x(s, state));
   }
   history.write_summary("", nlohmann::json::object());

@@ -14,16 +14,17 @@ namespace {
 /// One coupled run.
 template <int dim> class Run {
 public:
-  Run(const SolidParams &params, const bridge::CaseSettings &settings,
-      const std::filesystem::path &folder)
-      : solver_(params),
+  Run(const SolidParams &params, const bridge::CaseSettings &settings, std::filesystem::path folder)
+      : solver_(params), folder_(std::move(folder)), output_interval_(settings.output_interval),
         surface_(wetted_interface(solver_.discretisation(), solver_.clamped_side())),
-        history_(solver_, folder, settings.output_interval), progress_("solid", settings.end_time),
-        state_(solver_.initial_state()), forces_(dim * surface_.nodes.size()) {}
+        progress_("solid", settings.end_time), state_(solver_.initial_state()),
+        forces_(dim * surface_.nodes.size()) {}
 
   void coupled(bridge::Participant &bridge) {
     bridge.set_mesh(surface_.mesh);
     bridge.initialize();
+    // Only now: a partner that never comes must not cost the series of an earlier run.
+    history_.emplace(solver_, folder_, output_interval_);
     while (bridge.is_coupling_ongoing()) {
       if (bridge.iteration() == 1) {
         start_ = state_;
@@ -44,8 +45,10 @@ public:
     bridge.finalize();
   }
 
+  /// Nothing before the partner was met.
   void write_summary(std::string_view message, const bridge::Participant &bridge) const {
-    history_.write_summary(message, bridge::summary_of(bridge.statistics()));
+    if (history_)
+      history_->write_summary(message, bridge::summary_of(bridge.statistics()));
   }
 
 private:
@@ -64,13 +67,15 @@ private:
     bridge.report_totals(bridge::interface_totals(
         dim, surface_.mesh.positions, surface_.gather(load_), surface_.gather(start_.displacement),
         surface_.gather(state_.displacement)));
-    history_.record(start_, state_, load_, bridge.time());
-    progress_.update(bridge.time(), history_.note());
+    history_->record(start_, state_, load_, bridge.time());
+    progress_.update(bridge.time(), history_->note());
   }
 
   SolidSolver<dim> solver_;
+  std::filesystem::path folder_;
+  double output_interval_; // [s]
   Interface<dim> surface_;
-  History<dim> history_;
+  std::optional<History<dim>> history_;
   Progress progress_;
   SolidState state_, start_;        // now, and at the start of the window
   std::optional<SolidState> guess_; // the last iterate of the same window
@@ -83,9 +88,8 @@ void run_in(bridge::Participant &bridge, const SolidParams &params,
             const std::filesystem::path &folder) {
   Run<dim> run(params, bridge.case_settings(), folder);
   try {
-    run.coupled(bridge);
+    run_coupled(bridge, [&] { run.coupled(bridge); });
   } catch (const std::exception &error) {
-    bridge.abort(error.what());
     run.write_summary(error.what(), bridge);
     throw;
   }

@@ -13,8 +13,8 @@ class Participant;
 
 namespace sluice::solid {
 
-/// Runs the case to its end, writing into `folder`. Throws UserError on any failure, after the
-/// summary of what was computed has been written and the partner has been told.
+/// Runs the case to its end, writing into `folder` once the partner is met. Throws UserError on any
+/// failure, after the partner has been told and the summary of what was computed has been written.
 void run(const Config &config, const std::filesystem::path &folder);
 
 /// The same with a participant that is already made (tests: one that speaks to a thread).

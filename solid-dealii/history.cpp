@@ -109,8 +109,9 @@ void History<dim>::write_summary(std::string_view message, const nlohmann::json 
   summary.update(extra);
   const auto file = folder_ / "solid_summary.json";
   std::ofstream out(file);
-  out << summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n';
-  check(out.good(), "{}: cannot be written", file.string());
+  out << summary.dump(2, ' ', false, nlohmann::json::error_handler_t::replace) << '\n'
+      << std::flush;
+  check(out.good(), "{}: writing failed; is the disk full?", file.string());
 }
 
 template class History<2>;

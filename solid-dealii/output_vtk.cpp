@@ -66,6 +66,16 @@ template <int dim> struct OutputVtk<dim>::Impl {
     data.write_vtu(out);
   }
 
+  // Renamed when it is whole: a reader, or a run that ends here, never meets half an index.
+  void write_index() const {
+    const auto part = folder / "solid.pvd.part", whole = folder / "solid.pvd";
+    std::ofstream index(part);
+    dealii::DataOutBase::write_pvd_record(index, written);
+    index.flush();
+    check(index.good(), "{}: writing failed; is the disk full?", part.string());
+    std::filesystem::rename(part, whole);
+  }
+
   std::shared_ptr<const DealiiMesh<dim>> mesh;
   std::filesystem::path folder;
   unsigned int degree;
@@ -85,10 +95,10 @@ template <int dim> void OutputVtk<dim>::write(double time, const OutputFields &f
   const std::string name = fmt::format("solid_{:04}.vtu", impl_->written.size());
   std::ofstream out(impl_->folder / name);
   impl_->write_fields(out, fields);
-  check(out.good(), "{}: cannot be written", (impl_->folder / name).string());
+  out.flush(); // or a full disk shows in the destructor, where nobody asks
+  check(out.good(), "{}: writing failed; is the disk full?", (impl_->folder / name).string());
   impl_->written.emplace_back(time, name);
-  std::ofstream index(impl_->folder / "solid.pvd");
-  dealii::DataOutBase::write_pvd_record(index, impl_->written);
+  impl_->write_index();
 }
 
 template class OutputVtk<2>;

@@ -25,6 +25,7 @@ template <int dim> void print_check(const sluice::solid::SolidParams &params) {
 void run(const Options &options) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
+  config.allow_tables({"case", "bridge", "fluid", "fluid.wall", "fluid.gauge", "solid"});
   if (options.check_only) {
     const auto params = config.read<solid::SolidParams>("solid");
     return params.dimension == 2 ? print_check<2>(params) : print_check<3>(params);

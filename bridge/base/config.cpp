@@ -9,6 +9,7 @@
 #include <numeric>
 #include <optional>
 #include <sstream>
+#include <utility>
 
 namespace sluice {
 
@@ -74,14 +75,17 @@ void merge(toml::table &into, const toml::table &from) {
   }
 }
 
-void append_canonical(const toml::node &node, const std::string &path, std::string &text) {
+void append_canonical(const toml::node &node, const std::string &path, std::string_view secret,
+                      std::string &text) {
   if (const auto *table = node.as_table()) {
     for (const auto &[key, value] : *table)
-      append_canonical(value, path.empty() ? std::string(key.str()) : path + "." + std::string(key.str()), text);
-  } else if (const auto *array = node.as_array(); array && !array->empty() && array->get(0)->is_table()) {
+      append_canonical(value, fmt::format("{}{}{}", path, path.empty() ? "" : ".", key.str()),
+                       secret, text);
+  } else if (const auto *array = node.as_array();
+             array && !array->empty() && array->get(0)->is_table()) {
     for (std::size_t k = 0; k < array->size(); ++k)
-      append_canonical(*array->get(k), fmt::format("{}[{}]", path, k), text);
-  } else {
+      append_canonical(*array->get(k), fmt::format("{}[{}]", path, k), secret, text);
+  } else if (path != secret) {
     std::ostringstream out;
     node.visit([&](const auto &n) { out << n; });
     text += path + " = " + out.str() + "\n";
@@ -140,9 +144,9 @@ Config Config::parse(std::string_view text, std::string_view name,
 
 const std::string &Config::file_name() const { return document_->name; }
 
-std::string Config::canonical_text() const {
+std::string Config::canonical_text(std::string_view secret) const {
   std::string text;
-  append_canonical(document_->root, "", text);
+  append_canonical(document_->root, "", secret, text);
   return text;
 }
 
@@ -192,6 +196,7 @@ struct TableReader::State {
   std::string table_name;
   const toml::table *table = nullptr;
   std::vector<std::string> known;
+  std::optional<std::string> missing; // what to say of the first required key that is absent
 
   const toml::node *find(std::string_view key) {
     known.emplace_back(key);
@@ -200,7 +205,7 @@ struct TableReader::State {
 };
 
 TableReader::TableReader(const Config &config, std::string table, std::size_t array_index)
-    : state_(std::make_unique<State>(State{*config.document_, std::move(table), nullptr, {}})) {
+    : state_(std::make_unique<State>(State{*config.document_, std::move(table), nullptr, {}, {}})) {
   const auto node = state_->document.root.at_path(state_->table_name);
   if (!node)
     return;
@@ -244,6 +249,11 @@ void TableReader::reject_unknown_keys() const {
   }
 }
 
+void TableReader::reject_missing_keys() const {
+  if (state_->missing)
+    fail_at("", *state_->missing);
+}
+
 namespace {
 
 std::optional<double> number(const toml::node &node) {
@@ -267,7 +277,15 @@ template <class Vector> std::optional<Vector> vector_of(const toml::node &node) 
   return v;
 }
 
-template <class T> std::optional<T> exactly(const toml::node &node) { return node.value_exact<T>(); }
+template <class T> std::optional<T> exactly(const toml::node &node) {
+  return node.value_exact<T>();
+}
+
+std::optional<int> whole_number(const toml::node &node) {
+  const auto value = node.value_exact<std::int64_t>();
+  return value && std::in_range<int>(*value) ? std::optional(static_cast<int>(*value))
+                                             : std::nullopt;
+}
 
 } // namespace
 
@@ -309,8 +327,8 @@ void TableReader::read_parsed(std::string_view key, T &value, std::string_view h
                               Parse parse, std::string_view shape) {
   const toml::node *node = state_->find(key);
   if (!node) {
-    if (required)
-      fail_at(key, fmt::format("required key '{}' is missing ({})", key, help));
+    if (required && !state_->missing)
+      state_->missing = fmt::format("required key '{}' is missing ({})", key, help);
     return;
   }
   const auto read = parse(*node);
@@ -326,7 +344,8 @@ void TableReader::read_value(std::string_view key, double &value, std::string_vi
 }
 void TableReader::read_value(std::string_view key, int &value, std::string_view help,
                              bool required) {
-  read_parsed(key, value, help, required, exactly<std::int64_t>, "a whole number");
+  read_parsed(key, value, help, required, whole_number,
+              "a whole number between -2147483648 and 2147483647");
 }
 void TableReader::read_value(std::string_view key, bool &value, std::string_view help,
                              bool required) {
@@ -365,7 +384,7 @@ std::string text_of(const toml::node *node) {
 } // namespace
 
 Entry &Entry::check(bool holds, std::string_view what) {
-  if (!holds)
+  if (!holds && !reader_.state_->missing)
     reader_.fail_at(key_, fmt::format("{} = {} {}", key_,
                                       text_of(reader_.state_->table
                                                   ? reader_.state_->table->get(key_)

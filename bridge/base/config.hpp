@@ -59,7 +59,8 @@ public:
     read_value(key, value, help, false);
     return {*this, key};
   }
-  /// Required key: absence is an error.
+  /// Required key: absence is an error, reported once the whole table is read. Conditions do not
+  /// apply after it, as values may rest on the one that is missing.
   template <class T> Entry required(std::string_view key, T &value, std::string_view help) {
     read_value(key, value, help, true);
     return {*this, key};
@@ -68,6 +69,8 @@ public:
   [[noreturn]] void fail_at(std::string_view key, std::string_view message) const;
   /// Throws for the first key in the table that was not read, naming the nearest valid one.
   void reject_unknown_keys() const;
+  /// Throws for the first required key that was absent. Asked last: a misspelt one says more.
+  void reject_missing_keys() const;
 
 private:
   friend class Entry;
@@ -103,13 +106,23 @@ public:
 
   /// Reads table `name` ("fluid" or "fluid.walls"); a missing table reads as an empty one.
   template <class Params> Params read(std::string_view name) const {
-    return read_element<Params>(name, no_index);
+    return read_element<Params>(name, no_index, Others::refused);
   }
   /// Reads an array of tables `[[name]]`, in file order; empty when absent.
   template <class Params> std::vector<Params> read_all(std::string_view name) const {
     std::vector<Params> all;
     for (std::size_t k = 0, n = array_size(name); k < n; ++k)
-      all.push_back(read_element<Params>(name, k));
+      all.push_back(read_element<Params>(name, k, Others::refused));
+    return all;
+  }
+  /// The same for a reader that needs some keys of another's table; the rest is not its business.
+  template <class Params> Params peek(std::string_view name) const {
+    return read_element<Params>(name, no_index, Others::allowed);
+  }
+  template <class Params> std::vector<Params> peek_all(std::string_view name) const {
+    std::vector<Params> all;
+    for (std::size_t k = 0, n = array_size(name); k < n; ++k)
+      all.push_back(read_element<Params>(name, k, Others::allowed));
     return all;
   }
   /// Throws for a top-level or nested table that is not among `names` ("fluid", "fluid.walls" ...);
@@ -119,18 +132,22 @@ public:
   bool has_table(std::string_view name) const;
   const std::string &file_name() const;
   /// Every key and value in a fixed order, one per line: what both sides compare at connect.
-  std::string canonical_text() const;
+  /// Without the key `secret` ("bridge.token").
+  std::string canonical_text(std::string_view secret = "") const;
 
   static constexpr std::size_t no_index = static_cast<std::size_t>(-1);
 
 private:
   friend class TableReader;
+  enum class Others { refused, allowed }; ///< keys of the table that Params does not describe
   template <class Params>
-  Params read_element(std::string_view name, std::size_t index) const {
+  Params read_element(std::string_view name, std::size_t index, Others others) const {
     TableReader reader(*this, std::string(name), index);
     Params params;
     params.describe(reader);
-    reader.reject_unknown_keys();
+    if (others == Others::refused)
+      reader.reject_unknown_keys();
+    reader.reject_missing_keys();
     return params;
   }
   std::size_t array_size(std::string_view name) const;

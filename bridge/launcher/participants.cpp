@@ -5,6 +5,7 @@
 
 #include <fmt/ranges.h>
 
+#include <algorithm>
 #include <array>
 #include <unistd.h>
 
@@ -23,6 +24,26 @@ struct Kind {
 // The first one listed shows its progress on the terminal.
 constexpr std::array kinds{Kind{"fluid", "sluice-fluid", "fluid"},
                            Kind{"solid", "sluice-solid", "solid-dealii"}};
+
+// The fluid's own rule for having a partner: a coupled wall, and walls that move.
+struct FluidWalls {
+  std::string coupled_walls = "move";
+  template <class Reader> void describe(Reader &read) {
+    read("coupled_walls", coupled_walls, "what coupled walls do");
+  }
+};
+struct Wall {
+  bool coupled = false;
+  template <class Reader> void describe(Reader &read) {
+    read("coupled", coupled, "moves with the partner of the bridge");
+  }
+};
+
+bool fluid_has_partner(const Config &config) {
+  const auto walls = config.peek_all<Wall>("fluid.wall");
+  return config.peek<FluidWalls>("fluid").coupled_walls == "move" &&
+         std::any_of(walls.begin(), walls.end(), [](const Wall &wall) { return wall.coupled; });
+}
 
 fs::path own_folder() {
   std::error_code error;
@@ -66,12 +87,15 @@ Case read_case(const Config &config) {
 }
 
 std::vector<Participant> participants_of(const Config &config, const fs::path &folder) {
+  check(config.has_table("fluid"),
+        "{}: the case has no [fluid] table, and a solid would wait for it in vain; give it one, or "
+        "run sluice-solid --alone",
+        config.file_name());
+  const bool is_coupled = fluid_has_partner(config);
   std::vector<Participant> found;
   for (const Kind &kind : kinds)
-    if (config.has_table(kind.table))
+    if (config.has_table(kind.table) && (kind.table == "fluid" || is_coupled))
       found.push_back({std::string(kind.table), find_program(kind, folder)});
-  check(!found.empty(), "{}: the case has no participant; give it a [fluid] or a [solid] table",
-        config.file_name());
   return found;
 }
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Which programs a case needs. The tables of the case file decide: [fluid] starts sluice-fluid,
-// [solid] starts sluice-solid.
+// [solid] starts sluice-solid where the fluid has a wall that it moves.
 #pragma once
 
 #include "bridge/base/config.hpp"
@@ -26,7 +26,7 @@ Case read_case(const Config &config);
 
 /// The participants of the case in starting order. Programs are looked for in `folder` when it is
 /// given, otherwise beside this executable and in the build tree that it lies in.
-/// Throws UserError when the case has no participant or a program is not there.
+/// Throws UserError when the case has no fluid or a program is not there.
 std::vector<Participant> participants_of(const Config &config, const std::filesystem::path &folder);
 
 } // namespace sluice::launcher

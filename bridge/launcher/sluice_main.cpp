@@ -78,6 +78,14 @@ std::vector<std::string> arguments_of(const Options &options) {
   return arguments;
 }
 
+/// As the summary shows them: it may be passed on.
+std::vector<std::string> without_secrets(std::vector<std::string> overrides) {
+  for (std::string &text : overrides)
+    if (text.substr(0, text.find('=')).find("token") != std::string::npos)
+      text = text.substr(0, text.find('=')) + "=(not shown)";
+  return overrides;
+}
+
 std::string now_utc() {
   const std::time_t now = std::time(nullptr);
   char text[32];
@@ -174,7 +182,7 @@ int run(const Options &options) {
   const FolderLock lock = prepare_run_folder(folder, scene.name, options.case_file);
 
   RunDescription description{scene.name, fs::absolute(options.case_file).string(),
-                             options.overrides, threads, now_utc()};
+                             without_secrets(options.overrides), threads, now_utc()};
   std::vector<Command> commands;
   for (const Participant &participant : participants) {
     auto arguments = arguments_of(options);

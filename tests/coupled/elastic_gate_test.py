@@ -99,6 +99,16 @@ class CompleteRunTest(GateTest):
         self.assertTrue((out / "tip.csv").exists() and (out / "fluid.csv").exists())
 
 
+class UnknownTableTest(GateTest):
+    def test_table_that_nobody_reads_is_refused_by_either_program(self):
+        for table in ("solid.geometry", "fluid.gague", "brigde"):
+            for program in (FLUID, SOLID):
+                done = subprocess.run([program, str(CASE), "--check", "--set", f"{table}.x_m=3"],
+                                      capture_output=True, text=True, timeout=LONGEST_RUN_S)
+                self.assertEqual(done.returncode, 1)
+                self.assertIn(f"unknown table [{table}]", done.stderr)
+
+
 class FluidAloneTest(GateTest):
     def alone(self, name, *settings):
         out = self.folder / name

@@ -325,6 +325,16 @@ TEST(Scheme, the_explicit_scheme_accepts_each_pass_and_hands_it_on) {
   EXPECT_EQ(scheme.iterate().velocity[0], 6);
 }
 
+TEST(Scheme, an_iterate_that_is_not_finite_has_a_message_of_its_own) {
+  Scheme scheme(settings_for("constant"), state_of(-1.7e308, 0), 1, 1);
+  const IterationRecord record =
+      scheme.advance(state_of(1.7e308, 0), VectorXd::Ones(1), 1e-3, 1e-3);
+  EXPECT_EQ(record.verdict, Verdict::failed);
+  const std::string text = scheme.explanation(record);
+  EXPECT_NE(text.find("has no finite iterate to follow iteration 1"), std::string::npos) << text;
+  EXPECT_EQ(text.find("did not converge"), std::string::npos) << text;
+}
+
 TEST(Scheme, a_copy_continues_like_the_original) {
   const Problem problem = chain(5, 30);
   const auto n = problem.load.size();

@@ -34,6 +34,19 @@ TEST(WindowClock, the_last_window_is_what_is_left) {
   EXPECT_NEAR(lengths[3], 0.1, 1e-15);
 }
 
+TEST(CaseSettings, a_number_of_windows_that_cannot_be_counted_is_refused_with_the_numbers) {
+  const auto error = [](const char *end, const char *step) {
+    const auto text = fmt::format("[case]\nend_time_s = {}\ntime_step_s = {}\n", end, step);
+    return error_of([&] { Config::parse(text, "c.toml").read<CaseSettings>("case"); });
+  };
+  EXPECT_EQ(error("1", "1e-9"), "");
+  EXPECT_EQ(error("1e-3", "1"), "");
+  EXPECT_TRUE(contains(error("1e-7", "1"), "makes 0 windows until end_time_s = 1e-07"))
+      << error("1e-7", "1");
+  EXPECT_TRUE(contains(error("1e300", "1e-3"), "makes 1e+303 windows")) << error("1e300", "1e-3");
+  EXPECT_TRUE(contains(error("1e300", "1e-300"), "makes inf windows")) << error("1e300", "1e-300");
+}
+
 TEST(WindowClock, sub_steps_add_up_to_the_window) {
   WindowClock clock(times(1.0, 0.1));
   for (int k = 0; k < 6; ++k)
@@ -73,6 +86,31 @@ TEST(Participant, sub_steps_read_linearly_in_time_and_exchange_at_the_end_of_the
   }
   EXPECT_FALSE(bridge.is_coupling_ongoing());
   bridge.finalize();
+  fluid.join();
+}
+
+TEST(Participant, an_accepted_window_is_complete_though_the_partner_ends_in_the_next) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.bridge_keys = "scheme = \"serial-explicit\"\n";
+  auto ends = local_transports();
+  std::thread fluid([&] {
+    Participant bridge("fluid", piston.config(), folder.path(), std::move(ends.first));
+    bridge.set_mesh(solid_line());
+    bridge.initialize();
+    bridge.advance(bridge.max_time_step_size());
+    bridge.abort("out of points");
+  });
+  Participant bridge("solid", piston.config(), folder.path(), std::move(ends.second));
+  bridge.set_mesh(solid_line());
+  bridge.initialize();
+  EXPECT_EQ(error_of([&] { bridge.advance(bridge.max_time_step_size()); }), "");
+  EXPECT_TRUE(bridge.is_time_window_complete());
+  EXPECT_EQ(bridge.time(), piston.time_step);
+  std::vector<double> force(8);
+  const auto error = error_of([&] { bridge.read_data("force", 0, force); });
+  EXPECT_TRUE(contains(error, "iteration 1 of window 2")) << error;
+  EXPECT_TRUE(contains(error, "out of points")) << error;
   fluid.join();
 }
 

@@ -68,6 +68,49 @@ TEST(Config, a_missing_key_is_named) {
   EXPECT_TRUE(contains(error_of("[fluid]\ndensity_kg_m3 = 900\n"), "required key 'spacing_m' is missing"));
 }
 
+TEST(Config, a_misspelt_required_key_is_named_and_not_only_missed) {
+  const auto error = error_of("[fluid]\nwindows = 1\nspacin_m = 0.002\n");
+  EXPECT_TRUE(contains(error, "case.toml:3:")) << error;
+  EXPECT_TRUE(contains(error, "unknown key 'spacin_m'")) << error;
+  EXPECT_TRUE(contains(error, "did you mean 'spacing_m'")) << error;
+}
+
+TEST(Config, a_missing_key_is_named_before_a_condition_that_rests_on_it) {
+  struct Steps {
+    double end = 0, step = 0;
+    void describe(TableReader &read) {
+      read.required("end", end, "last instant");
+      read("step", step, "length").check(step <= end, "must not exceed the end");
+    }
+  };
+  try {
+    Config::parse("[case]\nstep = 1\n", "case.toml").read<Steps>("case");
+    FAIL() << "accepted";
+  } catch (const UserError &error) {
+    EXPECT_TRUE(contains(error.what(), "'end' is missing")) << error.what();
+  }
+}
+
+TEST(Config, a_whole_number_that_an_int_does_not_hold_is_refused) {
+  for (const auto *number : {"4294967297", "-2147483649", "9223372036854775807"}) {
+    const auto error = error_of(fmt::format("[fluid]\nspacing_m = 1\nwindows = {}\n", number));
+    EXPECT_TRUE(contains(error, "case.toml:3:")) << error;
+    EXPECT_TRUE(contains(error, "between -2147483648 and 2147483647")) << error;
+  }
+}
+
+TEST(Config, a_reader_of_some_keys_leaves_the_others_alone) {
+  struct Spacing {
+    double spacing = 0;
+    void describe(TableReader &read) { read.required("spacing_m", spacing, "distance"); }
+  };
+  const auto config = Config::parse("[fluid]\nspacing_m = 2\nx = 1\n[[fluid.wall]]\n"
+                                    "spacing_m = 3\ny = 1\n",
+                                    "c");
+  EXPECT_EQ(config.peek<Spacing>("fluid").spacing, 2);
+  EXPECT_EQ(config.peek_all<Spacing>("fluid.wall").at(0).spacing, 3);
+}
+
 TEST(Config, a_wrong_type_is_refused_with_its_place) {
   const auto error = error_of("[fluid]\nspacing_m = \"2 mm\"\n");
   EXPECT_TRUE(contains(error, "case.toml:2:13")) << error;
@@ -100,6 +143,11 @@ TEST(Config, the_canonical_text_does_not_depend_on_the_order_in_the_file) {
   const auto a = Config::parse("[b]\ny = 1\nx = 2\n[a]\nz = 3\n", "c").canonical_text();
   const auto b = Config::parse("[a]\nz = 3\n[b]\nx = 2\ny = 1\n", "d").canonical_text();
   EXPECT_EQ(a, b);
+}
+
+TEST(Config, the_canonical_text_leaves_a_secret_out) {
+  const auto config = Config::parse("[bridge]\ntoken = \"sesame\"\nscheme = 1\n", "c");
+  EXPECT_EQ(config.canonical_text("bridge.token"), "bridge.scheme = 1\n");
 }
 
 } // namespace

@@ -9,8 +9,6 @@
 #include "bridge/base/timer.hpp"
 
 #include <csignal>
-#include <sys/socket.h>
-#include <sys/un.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -240,19 +238,77 @@ TEST(Failure, interfaces_that_do_not_fit_end_both_programs) {
   expect_message(solid_error, {"the fluid gave up", "fluid node 0 at (0.2, 0, 0)"});
 }
 
+// Connects as soon as somebody listens; nothing after two seconds.
+std::unique_ptr<Transport> knock(const Address &address) {
+  std::unique_ptr<Transport> transport;
+  for (const Stopwatch watch; !transport && watch.seconds() < 2;)
+    transport = try_connect(address, deadline_in(1));
+  return transport;
+}
+
+// What the fluid says when a stranger keeps sending `bytes` instead of a greeting.
+Survivor meet_stranger(const Bytes &bytes) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.connect_deadline = 0.5;
+  std::jthread stranger([&](const std::stop_token &stop) {
+    const auto transport = knock(address_of(BridgeSettings(), folder.path()));
+    try {
+      for (std::size_t k = 0; transport && !stop.stop_requested(); ++k) {
+        transport->write_some(std::span(bytes).subspan(k % bytes.size(), 1), deadline_in(1));
+        if (k % header_size == header_size - 1 || bytes.size() == 1)
+          std::this_thread::sleep_for(std::chrono::milliseconds(100));
+      }
+    } catch (const ConnectionLost &) { // turned away
+    }
+  });
+  const Stopwatch watch;
+  const auto error = error_of([&] {
+    Participant bridge("fluid", piston.config(), folder.path());
+    run_fluid(bridge, piston);
+  });
+  return {error, watch.seconds()};
+}
+
+TEST(Failure, a_stranger_that_trickles_bytes_does_not_renew_the_deadline) {
+  const auto [error, seconds] = meet_stranger({std::byte{'S'}});
+  expect_message(error, {"the fluid waited 0.5 s", "connect_deadline_s"});
+  EXPECT_LT(seconds, 3);
+}
+
+TEST(Failure, a_heartbeat_is_no_greeting) {
+  const auto [error, seconds] = meet_stranger(encode_frame(FrameType::heartbeat, 0, {}));
+  expect_message(error, {"the fluid waited 0.5 s", "a heartbeat frame came instead of hello"});
+  EXPECT_LT(seconds, 3);
+}
+
+TEST(Failure, a_solid_that_meets_nobody_leaves_the_log_of_an_earlier_run) {
+  const TemporaryFolder folder;
+  CsvWriter(folder.path() / "coupling.csv", "of an earlier run");
+  Piston piston;
+  piston.connect_deadline = 0.1;
+  error_of([&] {
+    Participant bridge("solid", piston.config(), folder.path());
+    run_solid(bridge, piston);
+  });
+  std::ifstream log(folder.path() / "coupling.csv");
+  std::string header;
+  std::getline(log, header);
+  EXPECT_EQ(header, "of an earlier run");
+}
+
 TEST(Failure, strangers_at_the_door_do_not_disturb_the_run) {
   const TemporaryFolder folder;
   Piston piston;
   piston.windows = 3;
   const Address address = address_of(BridgeSettings(), folder.path());
+  int came = 0;
   std::thread strangers([&] {
-    for (int k = 0; k < 3; ++k) {
-      std::unique_ptr<Transport> transport;
-      for (const Stopwatch watch; !transport && watch.seconds() < 2;)
-        transport = try_connect(address, deadline_in(1));
+    for (; came < 3; ++came) {
+      const auto transport = knock(address);
       if (!transport)
         return;
-      const Bytes garbage(static_cast<std::size_t>(100 * k), std::byte{0x2a});
+      const Bytes garbage(static_cast<std::size_t>(100 * came), std::byte{0x2a});
       if (!garbage.empty())
         transport->write_some(garbage, deadline_in(1));
     }
@@ -265,6 +321,7 @@ TEST(Failure, strangers_at_the_door_do_not_disturb_the_run) {
     });
   });
   strangers.join();
+  EXPECT_EQ(came, 3) << "nobody was there to be disturbed";
   const auto solid_error = error_of([&] {
     Participant bridge("solid", piston.config(), folder.path());
     EXPECT_EQ(run_solid(bridge, piston).size(), 3u);
@@ -300,12 +357,21 @@ TEST(Address, a_malformed_tcp_address_is_refused) {
   for (const auto *text : {"localhost", ":200", "127.0.0.1:"})
     expect_message(error_of([&] { address_of(settings_with("tcp", text), "."); }),
                    {text, "expected host:port"});
+  for (const auto *text : {"127.0.0.1:65536", "127.0.0.1:0", "127.0.0.1:4294987796"})
+    expect_message(error_of([&] { address_of(settings_with("tcp", text), "."); }),
+                   {text, "between 1 and 65535"});
   EXPECT_EQ(address_of(settings_with("tcp", "[::1]:20500"), ".").host, "::1");
 }
 
 TEST(Listener, refuses_an_address_that_others_can_reach_without_a_token) {
   const Address address{Address::Family::tcp, "", "0.0.0.0", "20599"};
   expect_message(error_of([&] { Listener(address, ""); }), {"0.0.0.0:20599", "bridge.token"});
+}
+
+TEST(Listener, is_found_under_a_name_with_several_addresses) {
+  const Address address{Address::Family::tcp, "", "localhost", "20598"};
+  const Listener listener(address, "");
+  EXPECT_NE(try_connect(address, deadline_in(1)), nullptr);
 }
 
 TEST(Listener, a_second_run_at_the_same_address_is_refused_and_the_first_lives_on) {
@@ -322,12 +388,7 @@ TEST(Listener, a_second_run_at_the_same_address_is_refused_and_the_first_lives_o
 TEST(Listener, removes_the_leftover_of_a_killed_run_but_no_other_file) {
   const TemporaryFolder folder;
   const Address address{Address::Family::unix_domain, folder.path() / "a.sock", "", ""};
-  const int leftover = ::socket(AF_UNIX, SOCK_STREAM, 0);
-  sockaddr_un name{};
-  name.sun_family = AF_UNIX;
-  address.path.copy(name.sun_path, sizeof name.sun_path - 1);
-  ASSERT_EQ(::bind(leftover, reinterpret_cast<const sockaddr *>(&name), sizeof name), 0);
-  ::close(leftover);
+  leave_stale_socket(address.path);
   EXPECT_EQ(try_connect(address, deadline_in(1)), nullptr) << "a stale file is worth a retry";
   EXPECT_EQ(error_of([&] { Listener(address, ""); }), "");
   CsvWriter(address.path, "a file of the user");

@@ -12,6 +12,8 @@
 #include <filesystem>
 #include <random>
 #include <string>
+#include <sys/socket.h>
+#include <sys/un.h>
 #include <unistd.h>
 #include <vector>
 
@@ -59,6 +61,16 @@ inline std::vector<Vec<2>> uneven_line(const Vec<2> &a, const Vec<2> &b, int n, 
     points.push_back(a + (s + unevenness * s * (1 - s)) * (b - a));
   }
   return points;
+}
+
+/// The socket file of a run that was killed: bound once, nobody listens.
+inline void leave_stale_socket(const std::filesystem::path &path) {
+  const int leftover = ::socket(AF_UNIX, SOCK_STREAM, 0);
+  sockaddr_un name{};
+  name.sun_family = AF_UNIX;
+  path.string().copy(name.sun_path, sizeof name.sun_path - 1);
+  ASSERT_EQ(::bind(leftover, reinterpret_cast<const sockaddr *>(&name), sizeof name), 0);
+  ::close(leftover);
 }
 
 } // namespace sluice::bridge

@@ -22,7 +22,8 @@ time_step_s = 0.1
 [fluid]
 spacing_m = 0.01
 [[fluid.wall]]
-name = "tank"
+name = "gate"
+coupled = true
 [solid]
 width_m = 0.01
 """
@@ -129,6 +130,17 @@ class CompleteRunTest(LauncherTest):
         self.case.write_text(CASE[:CASE.index("[solid]")])
         self.assertEqual(self.run_case().returncode, 0)
         self.assertFalse((self.out / "solid.log").exists())
+
+    def test_solid_is_not_started_where_the_fluid_moves_no_wall(self):
+        self.assertEqual(self.run_case("--set", "fluid.coupled_walls=stay").returncode, 0)
+        self.assertFalse((self.out / "solid.log").exists())
+        self.case.write_text(CASE.replace("coupled = true\n", ""))
+        self.assertEqual(self.run_case().returncode, 0)
+        self.assertFalse((self.out / "solid.log").exists())
+
+    def test_token_is_not_shown_in_the_summary(self):
+        self.run_case("--set", "bridge.token=sesame")
+        self.assertEqual(self.summary()["overrides"], ["bridge.token=(not shown)"])
 
     def test_output_of_an_earlier_run_is_removed_and_other_files_stay(self):
         theirs = {"mine.csv", "notes.txt", "fluid_state.h5"}  # a run may start from the last one
@@ -328,11 +340,14 @@ class BadInputTest(LauncherTest):
 
     def test_misspelt_key_of_the_case_names_the_nearest(self):
         self.case.write_text(CASE.replace("end_time_s", "end_tme_s"))
-        self.refused(r"gate\.toml:\d+:\d+: .*end_t")
+        self.refused(r"gate\.toml:3:\d+: unknown key 'end_tme_s' in \[case\]; "
+                     r"did you mean 'end_time_s'\?")
 
-    def test_case_without_participants(self):
+    def test_case_without_a_fluid(self):
         self.case.write_text(CASE[:CASE.index("[fluid]")])
-        self.refused("no participant")
+        self.refused(r"has no \[fluid\] table")
+        self.case.write_text(CASE[:CASE.index("[fluid]")] + CASE[CASE.index("[solid]"):])
+        self.refused(r"has no \[fluid\] table")
 
     def test_malformed_override(self):
         self.refused("--set spacing: expected TABLE.KEY=VALUE", "--set", "spacing")

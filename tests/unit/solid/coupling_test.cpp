@@ -5,6 +5,7 @@
 #include "bridge/participant.hpp"
 #include "bridge/transport.hpp"
 #include "bridge/transport_local.hpp"
+#include "solid-dealii/alone.hpp"
 #include "solid-dealii/coupling.hpp"
 #include "solid-dealii/interface.hpp"
 
@@ -189,6 +190,29 @@ TEST(Coupling, rejected_iterations_leave_no_trace) {
   }
   const auto tips = read_csv(outcome.folder / "tip.csv");
   EXPECT_NEAR(tips.back()[1] / tip(solver, state, 0), 1, 2e-3); // the coupling tolerance
+}
+
+TEST(Coupling, a_solid_that_meets_nobody_leaves_the_series_of_an_earlier_run) {
+  const fs::path folder = fs::path(testing::TempDir()) / "nobody";
+  fs::remove_all(folder);
+  fs::create_directories(folder);
+  std::ofstream(folder / "tip.csv") << "of an earlier run\n";
+  const std::vector<std::string> soon{"bridge.connect_deadline_s=0.1"};
+  EXPECT_THROW(run(Config::parse(case_text, "case.toml", soon), folder), UserError);
+  std::ifstream tip(folder / "tip.csv");
+  std::string line;
+  std::getline(tip, line);
+  EXPECT_EQ(line, "of an earlier run");
+}
+
+TEST(Coupling, the_release_alone_ends_at_the_end_time_with_a_shorter_window) {
+  const fs::path folder = fs::path(testing::TempDir()) / "release";
+  fs::remove_all(folder);
+  const std::vector<std::string> end{"case.end_time_s=5e-4"};
+  run_alone("release", Config::parse(case_text, "case.toml", end), {1000, 9.81, 0.14}, folder);
+  const auto tips = read_csv(folder / "tip.csv");
+  ASSERT_EQ(tips.size(), 4u) << "at rest, two windows of 2e-4 s and one of 1e-4 s";
+  EXPECT_EQ(tips.back()[0], 5e-4);
 }
 
 TEST(Coupling, a_solid_that_fails_tells_its_partner_and_leaves_a_summary) {
