@@ -29,7 +29,7 @@ constexpr const char *lock_name = ".sluice-lock";
 bool belongs_to_a_run(const std::string &file) {
   static const std::regex names(
       R"((fluid|wall|solid)_\d+\.(vtp|vtu))"
-      R"(|(fluid|wall|solid)\.(log|pvd)|summary\.(json|md)|(fluid|solid)_summary\.json)"
+      R"(|(fluid|wall|solid)\.(log|pvd|pvd\.part)|summary\.(json|md)|(fluid|solid)_summary\.json)"
       R"(|(tip|fluid|coupling|balance|solid_energy|solid_loads|fluid_loads)\.csv)"
       R"(|(tip|levels|strip|energy)\.png|case\.toml)");
   return std::regex_match(file, names);

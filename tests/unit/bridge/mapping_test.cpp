@@ -189,24 +189,30 @@ TEST(Projection, finds_the_nearest_point_of_a_warped_quadrilateral) {
   }
 }
 
-// The distance of the face from the origin must not decide whether a point is found on it.
+// The distance of the face from the origin must not decide whether a point is found on it. The
+// point stands on the normal at (r, s), where neither gap nor residual round to zero by luck.
 TEST(Projection, finds_the_point_of_a_small_quadrilateral_far_from_the_origin) {
-  const double size = 2.8e-3, r = 0.3, s = 0.6; // [m], -, -
-  const std::array<double, 4> weights{(1 - r) * (1 - s), r * (1 - s), r * s, (1 - r) * s};
-  for (const double offset : {0.0, 1.0, 10.0}) {
-    const Vec<3> o(offset, offset, offset);
-    const std::array<Vec<3>, 4> x{o, o + size * Vec<3>(1, 0, 0.1), o + size * Vec<3>(1.1, 1, 0.2),
-                                  o + size * Vec<3>(0, 0.9, 0.1)};
-    Vec<3> p = Vec<3>::Zero();
-    for (std::size_t a = 0; a < 4; ++a)
-      p += weights[a] * x[a];
-    // Four products and sums of numbers as large as the offset, seen from a face of that size.
-    const double rounding = 16 * 1e-16 * (1 + offset / size);
-    const Projection found = project_on_quadrilateral(p, x);
-    for (std::size_t a = 0; a < 4; ++a)
-      EXPECT_NEAR(found.weights[a], weights[a], rounding) << "at " << offset << " m";
-    EXPECT_LE(std::sqrt(found.distance_squared), rounding * size);
-  }
+  const double size = 2.8e-3, height = 0.2 * size; // [m]
+  const auto places = random_values(40, 11, 0.45);
+  for (const double offset : {0.0, 1.0, 10.0})
+    for (std::size_t k = 0; k < places.size(); k += 2) {
+      const double r = 0.5 + places[k], s = 0.5 + places[k + 1];
+      const Vec<3> o(offset, offset, offset);
+      const std::array<Vec<3>, 4> x{o, o + size * Vec<3>(1, 0, 0.1), o + size * Vec<3>(1.1, 1, 0.2),
+                                    o + size * Vec<3>(0, 0.9, 0.1)};
+      const std::array<double, 4> weights{(1 - r) * (1 - s), r * (1 - s), r * s, (1 - r) * s};
+      const Vec<3> along_r = (1 - s) * (x[1] - x[0]) + s * (x[2] - x[3]);
+      const Vec<3> along_s = (1 - r) * (x[3] - x[0]) + r * (x[2] - x[1]);
+      Vec<3> p = height * along_r.cross(along_s).normalized();
+      for (std::size_t a = 0; a < 4; ++a)
+        p += weights[a] * x[a];
+      // Some ten sums of numbers as large as the offset, seen from a face of that size.
+      const double rounding = 16 * 1e-16 * (1 + offset / size);
+      const Projection found = project_on_quadrilateral(p, x);
+      for (std::size_t a = 0; a < 4; ++a)
+        EXPECT_NEAR(found.weights[a], weights[a], rounding) << "at " << offset << " m";
+      EXPECT_NEAR(std::sqrt(found.distance_squared), height, rounding * size);
+    }
 }
 
 TEST(InterfaceMesh, an_unusable_mesh_is_refused_with_the_place) {
