@@ -48,9 +48,9 @@ void update_walls(Points &points, const Walls &walls, double spacing, Cloud &clo
 /// Neighbour lists of the sorted points, those behind a wall left out.
 void update_neighbours(const Points &points, const Walls &walls, Cloud &cloud);
 
-/// Voronoi cells and point kinds; needs neighbours and projections. A hole counts as air when an
-/// empty circle through the point is larger than `open_ratio` spacings (`close_ratio` for a point
-/// that was at the surface in the last step).
+/// Voronoi cells and point kinds; needs neighbours and projections. A hole counts as air when the
+/// radius of an empty circle through the point exceeds 1.2 spacings, or 1.0 for a point that was
+/// open in the last step. Marks open points so for the next step.
 void update_cells(Points &points, Cloud &cloud);
 
 } // namespace sluice::fluid

@@ -9,6 +9,7 @@
 #include "fluid/state_file.hpp"
 
 #include <nlohmann/json.hpp>
+#include <optional>
 
 namespace sluice::fluid {
 
@@ -99,28 +100,76 @@ Start start_of(const Config &config, const bridge::CaseSettings &settings) {
         "{}: its state is of t = {} s, the run ends at case.end_time_s = {}", params.start_state,
         saved.time, settings.end_time);
   start.scene.initial = std::move(saved.state);
+  check_clear_of_walls(start.scene, params.motion.wall_clearance * params.spacing);
   start.time = saved.time;
   return start;
 }
+
+void check_folder(const FluidParams &params, const std::filesystem::path &folder) {
+  if (params.start_state.empty())
+    return;
+  const auto source = std::filesystem::absolute(params.start_state).parent_path();
+  check(!std::filesystem::equivalent(source, folder),
+        "{}: a run cannot go on in the folder of the run it starts from; choose another --out",
+        params.start_state);
+}
+
+// A lattice that does not fit the corners of the water holds more or less of it.
+void note_volume_error(const Scene &scene) {
+  constexpr double worth_a_note = 0.01;
+  const double error = volume_error(scene);
+  if (scene.params.start_state.empty() && std::abs(error) > worth_a_note)
+    fmt::print(stderr,
+               "fluid: the points stand for {:+.1f} % of the area of water_m: its edges are no "
+               "multiples of spacing_m = {} m\n",
+               100 * error, scene.params.spacing);
+}
+
+/// Steps of the fluid alone: counted, so that a run that goes on from another keeps its times; the
+/// last one is as long as the end time leaves it.
+class StepClock {
+public:
+  StepClock(double start, double end, double length) : end_(end), length_(length) {
+    const double steps_before = std::round(start / length);
+    const bool on_grid = std::abs(start - steps_before * length) <= 1e-6 * length;
+    origin_ = on_grid ? 0 : start;
+    step_ = on_grid ? static_cast<long>(steps_before) : 0;
+  }
+  bool is_over() const { return end_ - time() <= 1e-6 * length_; }
+  double time() const { return origin_ + static_cast<double>(step_) * length_; } ///< [s]
+  /// The next step's length [s].
+  double step_size() const {
+    const double left = end_ - time();
+    return left < (1 - 1e-6) * length_ ? left : length_;
+  }
+  void next() { ++step_; }
+
+private:
+  double end_, length_, origin_ = 0;
+  long step_ = 0;
+};
 
 /// One step alone or one window with a partner.
 class Run {
 public:
   Run(const Config &config, const std::filesystem::path &folder)
       : settings_(config.read<bridge::CaseSettings>("case")), start_(start_of(config, settings_)),
-        solver_(start_.scene),
-        history_(start_.scene, solver_, folder, settings_.output_interval, start_.time),
-        progress_("fluid", settings_.end_time) {}
+        solver_(start_.scene), folder_(folder), progress_("fluid", settings_.end_time) {
+    check_folder(start_.scene.params, folder);
+    note_volume_error(start_.scene);
+  }
 
   void alone() {
-    const long n = settings_.n_windows();
+    open_history();
     const std::vector<Vec<2>> at_rest(solver_.walls.position.size(), Vec<2>::Zero());
-    for (long window = std::lround(start_.time / settings_.time_step) + 1; window <= n; ++window) {
-      solver_.begin_step(settings_.time_step);
+    StepClock clock(start_.time, settings_.end_time, settings_.time_step);
+    while (!clock.is_over()) {
+      solver_.begin_step(clock.step_size());
       solver_.iterate();
       solver_.end_step();
+      clock.next();
       finish_step(interface_totals(solver_, at_rest, at_rest),
-                  static_cast<double>(window) * settings_.time_step);
+                  std::min(clock.time(), settings_.end_time));
     }
   }
 
@@ -128,6 +177,7 @@ public:
     CoupledSurface surface(solver_.walls);
     bridge.set_mesh(surface.mesh(solver_.walls));
     bridge.initialize();
+    open_history();
     const bool repeats_steps = bridge.settings().iterate == "full";
     while (bridge.is_coupling_ongoing()) {
       const double dt = bridge.max_time_step_size();
@@ -162,20 +212,27 @@ public:
   }
 
   void write_summary(const std::string &message, const nlohmann::json &bridge_summary) const {
-    history_.write_summary(solver_, message, bridge_summary);
+    if (history_)
+      history_->write_summary(solver_, message, bridge_summary);
   }
   bool has_partner() const { return fluid::has_partner(start_.scene); }
 
 private:
+  // Only a run that really begins touches the files of an earlier one.
+  void open_history() {
+    history_.emplace(start_.scene, solver_, folder_, settings_.output_interval, start_.time);
+  }
+
   void finish_step(const bridge::InterfaceTotals &loads, double time) {
-    history_.record(solver_, loads, time);
-    progress_.update(time, history_.note());
+    solver_.timer("record", [&] { history_->record(solver_, loads, time); });
+    progress_.update(time, history_->note());
   }
 
   bridge::CaseSettings settings_;
   Start start_;
   FluidSolver solver_;
-  History history_;
+  std::filesystem::path folder_;
+  std::optional<History> history_;
   Progress progress_;
   FluidState saved_;
   std::vector<Vec<2>> moved_from_; // displacement of the wall vertices at the window's start [m]
@@ -187,7 +244,8 @@ std::string describe(const Config &config) {
   const Start start = start_of(config, config.read<bridge::CaseSettings>("case"));
   if (has_partner(start.scene))
     config.read<bridge::BridgeSettings>("bridge");
-  return fmt::format("{} points, {} wall segments", start.scene.initial.points.size(),
+  return fmt::format("{} points ({:+.2f} % of the area of water_m), {} wall segments",
+                     start.scene.initial.points.size(), 100 * volume_error(start.scene),
                      start.scene.walls.segments.size());
 }
 

@@ -3,30 +3,38 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sluice::fluid {
 
-Integrals integrate(const FluidSolver &solver) {
-  const Points &points = solver.state.points;
-  const FluidParams &params = solver.params();
-  const Cloud &cloud = solver.cloud();
-  const CentreLine line(solver.walls);
+Integrals integrate(const FluidState &state, const FluidParams &params) {
+  const Points &points = state.points;
   const double area = params.spacing * params.spacing, mass = params.density * area;
   Integrals total;
+  total.point_volume = points.size() * area;
   for (int i = 0; i < points.size(); ++i) {
     const Vec<2> &u = points.velocity[i];
     const Vec<2> x =
-        points.position[i] + 0.5 * solver.dt() * (u - points.previous_velocity[i]);
+        points.position[i] + 0.5 * state.step_size * (u - points.previous_velocity[i]);
     total.kinetic += 0.5 * mass * u.squaredNorm();
     total.potential -= mass * params.gravity.dot(x);
     total.momentum += mass * u;
+    total.max_speed = std::max(total.max_speed, u.norm());
+  }
+  return total;
+}
+
+Integrals integrate(const FluidSolver &solver) {
+  const Points &points = solver.state.points;
+  const Cloud &cloud = solver.cloud();
+  const CentreLine line(solver.walls);
+  Integrals total = integrate(solver.state, solver.params());
+  for (int i = 0; i < points.size(); ++i) {
     total.volume += cloud.cell_area[i];
-    total.point_volume += area;
     if (!line.exists() || !line.is_past(points.position[i])) {
       total.tank_volume += cloud.cell_area[i];
-      total.tank_point_volume += area;
+      total.tank_point_volume += cloud.spacing * cloud.spacing;
     }
-    total.max_speed = std::max(total.max_speed, u.norm());
     total.min_pressure = std::min(total.min_pressure, points.pressure[i]);
     total.max_pressure = std::max(total.max_pressure, points.pressure[i]);
   }
@@ -58,10 +66,16 @@ bridge::InterfaceTotals interface_totals(const FluidSolver &solver, std::span<co
 }
 
 CentreLine::CentreLine(const Walls &walls) {
-  const std::size_t n = walls.coupled_vertices.size();
+  const auto &outline = walls.coupled_vertices;
+  const std::size_t n = outline.size();
+  const auto at = [&](std::size_t k) { return walls.position[outline[k]]; };
+  if (n < 4)
+    return;
+  const double middle = at(n / 2).y();
+  if (middle >= at(0).y() || middle >= at(n - 1).y())
+    return;
   for (std::size_t k = 0; k < n / 2; ++k)
-    line_.push_back(0.5 * (walls.position[walls.coupled_vertices[k]] +
-                           walls.position[walls.coupled_vertices[n - 1 - k]]));
+    line_.push_back(0.5 * (at(k) + at(n - 1 - k)));
 }
 
 bool CentreLine::is_past(const Vec<2> &x) const {
@@ -75,19 +89,34 @@ bool CentreLine::is_past(const Vec<2> &x) const {
   return x.x() > line_.front().x();
 }
 
-double water_level(const Points &points, double x, double spacing) {
+std::optional<double> floor_at(const Walls &walls, double x) {
+  std::optional<double> floor;
+  for (const WallSegment &s : walls.segments) {
+    const Vec<2> &a = walls.position[s.a], &b = walls.position[s.b];
+    if (!(a.x() <= x && x <= b.x() && a.x() < b.x())) // the fluid lies on the left: above
+      continue;
+    const double y = a.y() + (x - a.x()) / (b.x() - a.x()) * (b.y() - a.y());
+    floor = std::min(floor.value_or(y), y);
+  }
+  return floor;
+}
+
+double water_level(const Points &points, double x, double spacing, std::optional<double> floor) {
   std::vector<double> heights;
   for (const Vec<2> &p : points.position)
     if (std::abs(p.x() - x) <= spacing)
       heights.push_back(p.y());
   std::sort(heights.begin(), heights.end());
-  double level = 0;
+  if (heights.empty() && !floor)
+    return std::numeric_limits<double>::quiet_NaN();
+  const double bottom = floor ? *floor : heights.front();
+  double level = bottom;
   for (const double y : heights) {
     if (y - level > 2 * spacing)
       break;
     level = y;
   }
-  return heights.empty() ? 0.0 : level + 0.5 * spacing;
+  return level > bottom || !floor ? level + 0.5 * spacing : bottom;
 }
 
 } // namespace sluice::fluid

@@ -5,6 +5,8 @@
 #include "bridge/statistics.hpp"
 #include "fluid/step.hpp"
 
+#include <optional>
+
 namespace sluice::fluid {
 
 /// Integral state at the end of a step, per metre of depth.
@@ -20,7 +22,10 @@ struct Integrals {
   double min_pressure = 0, max_pressure = 0; // [Pa]
 };
 
-/// Positions are taken at the end of the step: stage position plus dt (u^{n+1} - u^n) / 2.
+/// Those that the points alone make up: energies, momentum, point_volume and speed. Positions are
+/// taken at the end of the step: stage position plus dt (u^{n+1} - u^n) / 2.
+Integrals integrate(const FluidState &state, const FluidParams &params);
+/// All of them; needs a completed step.
 Integrals integrate(const FluidSolver &solver);
 
 /// Force, moment about the origin and work of the fluid on the coupled walls: the fluid's own
@@ -29,7 +34,8 @@ Integrals integrate(const FluidSolver &solver);
 bridge::InterfaceTotals interface_totals(const FluidSolver &solver, std::span<const Vec<2>> start,
                                          std::span<const Vec<2>> end);
 
-/// Centre line of a plate-like coupled wall whose outline runs down one face and up the other.
+/// Centre line of a coupled wall that hangs down like a gate: an outline that runs down one face and
+/// up the other. Other coupled walls have none.
 class CentreLine {
 public:
   explicit CentreLine(const Walls &walls);
@@ -43,7 +49,11 @@ private:
   std::vector<Vec<2>> line_; // from the clamp to the tip
 };
 
-/// Height of the connected water column at x [m]: its top point plus half a spacing.
-double water_level(const Points &points, double x, double spacing);
+/// Height of the lowest wall at x that has the fluid above it [m], if there is one.
+std::optional<double> floor_at(const Walls &walls, double x);
+
+/// Height of the water column at x that stands on `floor` [m]: its top point plus half a spacing;
+/// the floor itself where it is dry. Without a floor: of the lowest column, NaN where there is none.
+double water_level(const Points &points, double x, double spacing, std::optional<double> floor);
 
 } // namespace sluice::fluid

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/history.hpp"
 
+#include "bridge/base/check.hpp"
 #include "fluid/state_file.hpp"
 
 #include <cmath>
@@ -16,7 +17,8 @@ std::string series_header(const std::vector<GaugeParams> &gauges) {
       "time_s,kinetic_j,potential_j,work_on_walls_j,outlet_energy_j,volume_m2,point_volume_m2,"
       "tank_volume_m2,tank_point_volume_m2,outflow_past_tip_m2,outflow_m2,max_speed_m_s,"
       "min_pressure_pa,max_pressure_pa,momentum_x_n_s,momentum_y_n_s,wall_force_x_n,"
-      "wall_force_y_n,outlet_momentum_x_n_s,outlet_momentum_y_n_s,guarded_rows,pressure_iterations,wall_returns,lost_points,points";
+      "wall_force_y_n,outlet_momentum_x_n_s,outlet_momentum_y_n_s,guarded_rows,"
+      "pressure_iterations,wall_returns,lost_points,points";
   for (const GaugeParams &gauge : gauges)
     header += ",level_" + gauge.name + "_m";
   return header;
@@ -31,15 +33,15 @@ History::History(const Scene &scene, const FluidSolver &solver, std::filesystem:
       loads_(folder_ / "fluid_loads.csv", "window,time_s,fx_n,fy_n,moment_nm,magnitude_n,"
                                           "moment_magnitude_nm,work_j,work_magnitude_j"),
       points_(folder_), walls_(folder_), output_interval_(output_interval), last_time_(time) {
-  const FluidParams &params = scene.params;
-  const double mass = params.density * params.spacing * params.spacing;
   const Points &points = solver.state.points;
-  for (int i = 0; i < points.size(); ++i) {
-    start_.kinetic += 0.5 * mass * points.velocity[i].squaredNorm();
-    start_.potential -= mass * params.gravity.dot(points.position[i]);
-  }
+  start_ = integrate(solver.state, scene.params);
+  double lowest = -1e300;
+  for (const Vec<2> &x : points.position)
+    lowest = std::max(lowest, scene.params.gravity.dot(x));
+  energy_scale_ = start_.kinetic + start_.potential +
+                  scene.params.density * start_.point_volume * lowest;
   outlet_energy_ = start_outlet_energy_ = solver.outlet_energy();
-  initial_volume_ = solver.state.points.size() * params.spacing * params.spacing;
+  initial_volume_ = start_.point_volume;
   last_ = start_;
   write_fields(solver, time);
 }
@@ -60,10 +62,13 @@ Vec<2> History::force_on_all_walls(const FluidSolver &solver) {
   return integrate_resultant(all_walls_, all_tractions_).force;
 }
 
+double History::energy_gain(const Integrals &now) const {
+  return now.kinetic + now.potential + work_on_walls_ + outlet_energy_ - start_.kinetic -
+         start_.potential - start_outlet_energy_;
+}
+
 void History::update_extremes(const FluidSolver &solver, const Integrals &now) {
-  const double energy0 = start_.kinetic + start_.potential + start_outlet_energy_;
-  const double energy = now.kinetic + now.potential + work_on_walls_ + outlet_energy_;
-  energy_gain_max_ = std::max(energy_gain_max_, (energy - energy0) / std::abs(energy0));
+  energy_gain_max_ = std::max(energy_gain_max_, energy_gain(now));
   volume_drift_max_ =
       std::max(volume_drift_max_,
                std::abs(now.tank_volume - now.tank_point_volume) / initial_volume_);
@@ -94,7 +99,8 @@ void History::record(const FluidSolver &solver, const bridge::InterfaceTotals &l
       static_cast<double>(state.wall_returns), static_cast<double>(state.lost_points),
       static_cast<double>(state.points.size())};
   for (const GaugeParams &gauge : gauges_)
-    row.push_back(water_level(state.points, gauge.x, spacing));
+    row.push_back(
+        water_level(state.points, gauge.x, spacing, floor_at(solver.walls, gauge.x)));
   series_.row(row);
   write_fields(solver, time);
   last_ = now;
@@ -129,7 +135,6 @@ void History::write_summary(const FluidSolver &solver, const std::string &messag
     own += seconds;
   }
   const double area = solver.params().spacing * solver.params().spacing;
-  const double energy0 = start_.kinetic + start_.potential + start_outlet_energy_;
   summary["points"] = solver.state.points.size() + solver.state.outflow_points +
                       solver.state.lost_points;
   summary["spacing_m"] = solver.params().spacing;
@@ -147,16 +152,19 @@ void History::write_summary(const FluidSolver &solver, const std::string &messag
   summary["pressure_iterations_per_solve"] =
       static_cast<double>(pressure_iterations_) / std::max(1L, pressure_solves_);
   summary["volume_drift_max"] = volume_drift_max_;
-  summary["energy_gain_max"] = energy_gain_max_;
-  summary["energy_drift"] =
-      (last_.kinetic + last_.potential + work_on_walls_ + outlet_energy_ - energy0) /
-      std::abs(energy0);
+  if (steps_ > 0 && energy_scale_ > 0) {
+    summary["energy_gain_max"] = energy_gain_max_ / energy_scale_;
+    summary["energy_drift"] = energy_gain(last_) / energy_scale_;
+  }
   summary["completed"] = message.empty();
   if (!message.empty())
     summary["message"] = message;
+  const auto file = folder_ / "fluid_summary.json";
+  std::ofstream out(file);
+  out << summary.dump(2) << '\n' << std::flush;
+  check(out.good(), "{}: cannot be written", file.string());
   if (message.empty())
     write_state_file(solver, last_time_);
-  std::ofstream(folder_ / "fluid_summary.json") << summary.dump(2) << '\n';
 }
 
 } // namespace sluice::fluid

@@ -16,7 +16,7 @@ namespace sluice::fluid {
 
 class History {
 public:
-  /// `time` [s] is that of the solver's first state.
+  /// Opens the files in `folder` and records the first state, whose time is `time` [s].
   History(const Scene &scene, const FluidSolver &solver, std::filesystem::path folder,
           double output_interval, double time = 0);
 
@@ -33,6 +33,7 @@ private:
   void write_fields(const FluidSolver &solver, double time);
   void write_state_file(const FluidSolver &solver, double time) const;
   Vec<2> force_on_all_walls(const FluidSolver &solver); // without contact [N/m]
+  double energy_gain(const Integrals &now) const; // since the start [J/m]
   void update_extremes(const FluidSolver &solver, const Integrals &now);
 
   std::filesystem::path folder_;
@@ -47,6 +48,7 @@ private:
   double work_on_walls_ = 0, outlet_energy_ = 0, start_outlet_energy_ = 0, last_time_ = 0;
   Integrals start_, last_;
   long guarded_rows_ = 0, steps_ = 0, pressure_iterations_ = 0, pressure_solves_ = 0;
+  double energy_scale_ = 0; // [J/m], kinetic and potential above the lowest point at the start
   double volume_drift_max_ = 0, energy_gain_max_ = -1e300;
   double initial_volume_ = 0;
   WallQuadrature all_walls_;

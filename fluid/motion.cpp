@@ -10,10 +10,11 @@
 
 namespace sluice::fluid {
 
-void move_points(Points &points, double dt) {
+void move_points(Points &points, double dt, double previous_dt) {
+  const double ahead = previous_dt > 0 ? 0.5 * dt / previous_dt : 0.5;
   for_each_point(points.size(), [&](int i) {
     Vec<2> &u = points.velocity[i], &old = points.previous_velocity[i];
-    points.position[i] += dt * (1.5 * u - 0.5 * old) + points.shift[i];
+    points.position[i] += dt * ((1 + ahead) * u - ahead * old) + points.shift[i];
     u += points.shift_velocity[i];
     old += points.shift_velocity[i];
     points.shift[i].setZero();
@@ -85,7 +86,7 @@ ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const Moti
       part[3] += change.y();
     }
     return part;
-  });
+  }, Work::heavy);
   return {static_cast<int>(sums[0]), static_cast<int>(sums[1]), {sums[2], sums[3]}};
 }
 

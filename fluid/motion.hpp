@@ -33,14 +33,16 @@ struct ContactCounts {
 };
 
 /// Advances the points by a step `dt` [s] with the second-order extrapolation of their velocity,
-/// x += dt (3 u^n - u^{n-1}) / 2, which from stage to stage is the trapezoidal rule; then applies
-/// the pending regularisation. (The cloud lives at the stage positions; derived here.)
-void move_points(Points &points, double dt);
+/// x += dt ((1 + r/2) u^n - r/2 u^{n-1}), r = dt / previous_dt, which from stage to stage is the
+/// trapezoidal rule; then applies the pending regularisation. `previous_dt` [s] is the step that
+/// ended in u^n, 0 before the first. (The cloud lives at the stage positions; derived here.)
+void move_points(Points &points, double dt, double previous_dt);
 
 /// Puts points that are behind a wall or too close to it back to the clearance and removes their
-/// velocity towards it; between two opposite walls, to the middle. Needs the cloud's projections.
+/// velocity towards it; two walls on opposite sides leave each at most 0.45 of the gap as
+/// clearance. Needs the cloud's projections.
 ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
-                        const Cloud &cloud);
+                                  const Cloud &cloud);
 
 /// Divergence that brings the cells back to their volume [1/s], zero at the free surface: the
 /// relative volume error, averaged over the neighbours, times volume_rate sqrt(g / spacing).
@@ -50,7 +52,8 @@ void volume_restoring_divergence(const Points &points, const Cloud &cloud,
 
 /// Regularisation to be applied in the next move: towards the cell's centroid at a rate
 /// proportional to the local strain rate (along the surface only, at the free surface), and apart
-/// from a neighbour that is too close; plus an agitation proportional to the strain. Zero on a regular cloud and in a fluid at rest.
+/// from a neighbour that is too close; plus an agitation proportional to the strain. Zero in a fluid
+/// at rest whose points keep their distance.
 void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
                 std::span<const Mat<2>> velocity_gradient, double dt);
 

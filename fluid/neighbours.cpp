@@ -10,10 +10,10 @@
 namespace sluice::fluid {
 
 int Grid::column(double x) const {
-  return std::clamp(static_cast<int>((x - origin.x()) / cell_size), 0, nx - 1);
+  return static_cast<int>(std::clamp((x - origin.x()) / cell_size, 0.0, nx - 1.0));
 }
 int Grid::row(double y) const {
-  return std::clamp(static_cast<int>((y - origin.y()) / cell_size), 0, ny - 1);
+  return static_cast<int>(std::clamp((y - origin.y()) / cell_size, 0.0, ny - 1.0));
 }
 
 Grid grid_over(const Points &points, double cell_size) {
@@ -67,14 +67,7 @@ void sort_by_cell(Points &points, const Grid &grid, CellRanges &ranges) {
   }
   if (in_order)
     return;
-  reorder(points.position, order);
-  reorder(points.velocity, order);
-  reorder(points.previous_velocity, order);
-  reorder(points.shift, order);
-  reorder(points.shift_velocity, order);
-  reorder(points.pressure, order);
-  reorder(points.id, order);
-  reorder(points.at_surface, order);
+  for_each_array(points, [&](const char *, auto &values) { reorder(values, order); });
 }
 
 namespace {
@@ -127,6 +120,22 @@ void find_neighbours(const Points &points, const Grid &grid, const CellRanges &r
   if (longest >= lists.capacity)
     for (int &count : lists.count)
       count = std::min(count, lists.capacity - 1);
+}
+
+void lay_out_rows(const NeighbourLists &lists, SparseMatrix &matrix) {
+  const int n = static_cast<int>(lists.count.size());
+  matrix.row_start.resize(n + 1);
+  matrix.row_start[0] = 0;
+  for (int i = 0; i < n; ++i)
+    matrix.row_start[i + 1] = matrix.row_start[i] + 1 + lists.count[i];
+  matrix.column.resize(matrix.row_start[n]);
+  matrix.value.resize(matrix.row_start[n]);
+  for_each_point(n, [&](int i) {
+    int *column = &matrix.column[matrix.row_start[i]];
+    const auto neighbours = lists.of(i);
+    *column = i;
+    std::copy(neighbours.begin(), neighbours.end(), column + 1);
+  });
 }
 
 } // namespace sluice::fluid

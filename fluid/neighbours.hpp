@@ -4,6 +4,7 @@
 
 #include "bridge/base/vec.hpp"
 #include "fluid/points.hpp"
+#include "fluid/sparse_matrix.hpp"
 
 #include <span>
 #include <vector>
@@ -52,5 +53,9 @@ void sort_by_cell(Points &points, const Grid &grid, CellRanges &ranges);
 /// All pairs closer than `radius`; the grid's cells must not be smaller than `radius`.
 void find_neighbours(const Points &points, const Grid &grid, const CellRanges &ranges,
                      double radius, NeighbourLists &lists);
+
+/// Rows with the point itself first and its neighbours after it, in the order of the lists; room for
+/// the values, which are not set.
+void lay_out_rows(const NeighbourLists &lists, SparseMatrix &matrix);
 
 } // namespace sluice::fluid

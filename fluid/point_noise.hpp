@@ -6,8 +6,8 @@
 //   e_ij = u_j - u_i - (G_i + G_j) . r_ij / 2,   du_i = dt rate sum_j W_ij e_ij / W_lattice,
 //
 // is zero for every quadratic field and of third order for smooth ones, but full for alternating
-// ones. Antisymmetric in i and j with symmetric weights: linear momentum is kept. Derived here; the
-// idea is that of Rhie and Chow, AIAA J. 21 (1983) 1525. A rate: independent of the step.
+// ones. Antisymmetric in i and j with symmetric weights: linear momentum is kept (up to neighbours
+// that a crowded list leaves out). Derived here; the idea is that of Rhie and Chow, AIAA J. 21 (1983) 1525. A rate: independent of the step.
 #pragma once
 
 #include "fluid/cloud.hpp"

@@ -26,10 +26,23 @@ struct Points {
   int size() const { return static_cast<int>(position.size()); }
 };
 
+/// Calls body(name, array) for every array of the points: the one list of them.
+template <class AnyPoints, class Body> void for_each_array(AnyPoints &points, Body &&body) {
+  body("position", points.position);
+  body("velocity", points.velocity);
+  body("previous_velocity", points.previous_velocity);
+  body("shift", points.shift);
+  body("shift_velocity", points.shift_velocity);
+  body("pressure", points.pressure);
+  body("id", points.id);
+  body("at_surface", points.at_surface);
+}
+
 /// All that a step reads and writes between windows.
 struct FluidState {
   Points points;
   std::int64_t step = 0;           // steps completed
+  double step_size = 0;            // [s], of the last step
   std::int64_t wall_returns = 0;   // points put back through a wall so far
   std::int64_t outflow_points = 0; // points that left through the outlet so far
   std::int64_t lost_points = 0;    // points that ended outside except through the outlet

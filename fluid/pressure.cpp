@@ -233,13 +233,7 @@ void surface_row(const Stencil &s, const Cloud &cloud, std::span<double> entry) 
 
 void lay_out(const Cloud &cloud, PressureProblem &problem) {
   const int n = static_cast<int>(cloud.kind.size());
-  SparseMatrix &matrix = problem.matrix;
-  matrix.row_start.resize(n + 1);
-  matrix.row_start[0] = 0;
-  for (int i = 0; i < n; ++i)
-    matrix.row_start[i + 1] = matrix.row_start[i] + 1 + cloud.neighbours.count[i];
-  matrix.column.resize(matrix.row_start[n]);
-  matrix.value.resize(matrix.row_start[n]);
+  lay_out_rows(cloud.neighbours, problem.matrix);
   problem.fluid_source.resize(n);
   problem.source.resize(n);
   problem.gradient.resize(n);
@@ -258,7 +252,6 @@ public:
   RowKind row(int i) const {
     Stencil s;
     gather(i, points_, cloud_, s);
-    fill_columns(s);
     if (cloud_.kind[i] != PointKind::interior) {
       open_row(s);
       return RowKind::quadratic;
@@ -270,13 +263,6 @@ private:
   std::span<double> off_diagonal(const Stencil &s) const {
     return {problem_.matrix.value.data() + problem_.matrix.row_start[s.i] + 1,
             static_cast<std::size_t>(s.count)};
-  }
-
-  void fill_columns(const Stencil &s) const {
-    int *column = problem_.matrix.column.data() + problem_.matrix.row_start[s.i];
-    *column = s.i;
-    for (int k = 0; k < s.count; ++k)
-      column[k + 1] = s.neighbour[k].j;
   }
 
   void open_row(const Stencil &s) const {
@@ -433,9 +419,11 @@ void assemble_pressure(const Points &points, const Cloud &cloud, const PressureP
     for (int i = range.begin; i < range.end; ++i)
       count[static_cast<std::size_t>(assemble.row(i))] += 1;
     return count;
-  });
+  }, Work::heavy);
   problem.rows = {static_cast<int>(counts[0]), static_cast<int>(counts[1]),
                   static_cast<int>(counts[2])};
+  problem.has_open_point = std::any_of(cloud.kind.begin(), cloud.kind.end(),
+                                       [](PointKind kind) { return kind != PointKind::interior; });
 }
 
 void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressureParams &params,

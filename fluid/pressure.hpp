@@ -25,9 +25,9 @@ struct WallRow {
   double datum = 0;         // g = n . grad p [Pa/m], with the latest wall velocity
 };
 
-/// How the rows of the Laplacian were made, for the run report.
+/// How the rows were made, for the run report.
 struct RowCounts {
-  int quadratic = 0; // the quadratic fit
+  int quadratic = 0; // the quadratic fit, or the surface row of an open point
   int linear = 0;    // sign guard: renormalised (LDD) Laplacian instead
   int plain = 0;     // sign guard: positive weights without correction
 };
@@ -39,8 +39,9 @@ struct PressureProblem {
   std::vector<double> source;       // right-hand side with it
   std::vector<Eigen::Matrix<double, 5, 2>> gradient; // functionals of d/dx and d/dy per point
   std::vector<std::array<WallRow, 3>> wall_rows;     // per wall slot
-  std::vector<Mat<2>> velocity_gradient;             // of u* [1/s], rows: component
+  std::vector<Mat<2>> velocity_gradient;             // of u* [1/s], row: component
   RowCounts rows;
+  bool has_open_point = false; // else pressure is known up to a constant
 };
 
 struct PressureParams {
@@ -55,8 +56,9 @@ void assemble_pressure(const Points &points, const Cloud &cloud, const PressureP
                        std::span<const double> target_divergence, double dt,
                        PressureProblem &problem);
 
-/// Water next to air bears no tension: an interior point that touches an open one and whose row
-/// would pull its pressure below zero becomes open itself, pressure zero, held by no wall. So a jet
+/// Water next to air bears no tension: an interior point that touches an open one, or one that was
+/// released in the last step, and whose row would pull its pressure below zero becomes open itself,
+/// pressure zero, held by no wall. So a jet
 /// separates from an edge and spray flies freely. Decided once per step, before the coupling
 /// iterates (the map stays affine). Returns the number of points released.
 int release_tension(Points &points, const Walls &walls, const PressureParams &params,

@@ -4,8 +4,10 @@
 #include "bridge/base/check.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 namespace sluice::fluid {
 
@@ -17,9 +19,13 @@ void add_leg(Walls &walls, const WallParams &wall, int wall_index, const Vec<2> 
   const int first = static_cast<int>(walls.position.size()) - 1;
   const Vec<2> from = walls.position[first];
   const double length = (to - from).norm();
-  const int pieces = wall.segment_length > 0
-                         ? std::max(1, static_cast<int>(std::ceil(length / wall.segment_length - 1e-9)))
-                         : 1;
+  constexpr double most_pieces = 1e6;
+  const double wanted =
+      wall.segment_length > 0 ? std::ceil(length / wall.segment_length - 1e-9) : 1;
+  check(wanted <= most_pieces, "wall '{}': segment_length_m = {} m cuts a leg of {} m into {:.3g} "
+                               "pieces, at most {:.0e} are handled",
+        wall.name, wall.segment_length, length, wanted, most_pieces);
+  const int pieces = std::max(1, static_cast<int>(wanted));
   for (int k = 1; k <= pieces; ++k) {
     const double t = static_cast<double>(k) / pieces;
     walls.position.push_back(k == pieces ? to : Vec<2>((1 - t) * from + t * to));
@@ -46,20 +52,28 @@ void add_wall(Walls &walls, const WallParams &wall) {
       walls.coupled_vertices.push_back(v);
 }
 
+// Names become columns and groups of the output.
+template <class Named> void check_names(const std::vector<Named> &all, std::string_view kind) {
+  std::set<std::string> seen;
+  for (const Named &one : all) {
+    const bool is_plain = !one.name.empty() &&
+                          std::all_of(one.name.begin(), one.name.end(), [](unsigned char c) {
+                            return std::isalnum(c) || c == '_' || c == '-';
+                          });
+    check(is_plain, "{} '{}': a name has letters, digits, '_' and '-' only", kind, one.name);
+    check(seen.insert(one.name).second, "two {}s are called '{}'", kind, one.name);
+  }
+}
+
 Walls read_walls(const Config &config) {
   Walls walls;
-  for (const WallParams &wall : config.read_all<WallParams>("fluid.wall"))
+  const auto tables = config.read_all<WallParams>("fluid.wall");
+  check_names(tables, "wall");
+  for (const WallParams &wall : tables)
     add_wall(walls, wall);
   walls.velocity.assign(walls.position.size(), Vec<2>::Zero());
   link_outlines(walls);
   return walls;
-}
-
-std::vector<int> all_segments(const Walls &walls) {
-  std::vector<int> all(walls.segments.size());
-  for (std::size_t k = 0; k < all.size(); ++k)
-    all[k] = static_cast<int>(k);
-  return all;
 }
 
 // --- water ----------------------------------------------------------------------------------
@@ -97,41 +111,23 @@ Box bounding_box(const std::vector<Vec<2>> &points) {
 
 // Square lattice over the box, half a spacing inside its edges, turned about the box's corner.
 std::vector<Vec<2>> lattice_in(const std::vector<Vec<2>> &polygon, double spacing, double angle) {
-  const Box box = bounding_box(polygon);
-  const Vec<2> size = box.high - box.low;
-  const double c = std::cos(angle), s = std::sin(angle);
-  const int reach = static_cast<int>((size.x() + size.y()) / spacing) + 2;
-  const int low = angle == 0 ? 0 : -reach;
+  const Vec<2> corner = bounding_box(polygon).low;
+  Mat<2> turn;
+  turn << std::cos(angle), -std::sin(angle), std::sin(angle), std::cos(angle);
+  std::vector<Vec<2>> in_lattice; // the polygon in coordinates along the rows, in spacings
+  for (const Vec<2> &x : polygon)
+    in_lattice.push_back(turn.transpose() * (x - corner) / spacing);
+  const Box extent = bounding_box(in_lattice);
   std::vector<Vec<2>> points;
-  for (int j = low; j < reach; ++j)
-    for (int i = low; i < reach; ++i) {
-      const Vec<2> l = spacing * Vec<2>(i + 0.5, j + 0.5);
-      const Vec<2> x = box.low + Vec<2>(c * l.x() - s * l.y(), s * l.x() + c * l.y());
-      if (is_inside(polygon, x))
+  for (double j = std::floor(extent.low.y()) + 0.5; j < extent.high.y(); ++j)
+    for (double i = std::floor(extent.low.x()) + 0.5; i < extent.high.x(); ++i)
+      if (const Vec<2> x = corner + spacing * (turn * Vec<2>(i, j)); is_inside(polygon, x))
         points.push_back(x);
-    }
   return points;
 }
 
-void check_clear_of_walls(const Scene &scene) {
-  const auto segments = all_segments(scene.walls);
-  const double spacing = scene.params.spacing;
-  for (const Vec<2> &x : scene.initial.points.position)
-    for (const Projection &p : project_on_walls(scene.walls, segments, x, spacing))
-      check(p.distance > 0,
-            "the water overlaps wall '{}': a point at ({:.6g}, {:.6g}) m lies {:.3g} m behind it; "
-            "correct water_m or the wall (the fluid lies on the left of its points_m)",
-            scene.walls.names[scene.walls.segments[p.segment].wall], x.x(), x.y(), -p.distance);
-}
-
-void check_hole(const Scene &scene, std::span<const int> segments, const Vec<2> &x) {
-  double nearest = 1e300;
-  for (const int s : segments) {
-    const WallSegment &segment = scene.walls.segments[s];
-    const Vec<2> a = scene.walls.position[segment.a], e = scene.walls.position[segment.b] - a;
-    const double t = std::clamp((x - a).dot(e) / e.squaredNorm(), 0.0, 1.0);
-    nearest = std::min(nearest, (a + t * e - x).norm());
-  }
+void check_hole(const Scene &scene, const Vec<2> &x) {
+  const double nearest = distance_to_walls(scene.walls, x);
   check(nearest < 0.5 * scene.params.spacing,
         "hole in the walls below the water line at ({:.6g}, {:.6g}) m: the nearest wall is {:.3g} m "
         "away; close the wall there, or set open_sides = true if the water is meant to run out",
@@ -140,7 +136,6 @@ void check_hole(const Scene &scene, std::span<const int> segments, const Vec<2> 
 
 // Every edge of the water that does not face upwards must lie on a wall.
 void check_holes(const Scene &scene) {
-  const auto segments = all_segments(scene.walls);
   const std::vector<Vec<2>> &water = scene.params.water;
   const double orientation = signed_area(water) > 0 ? 1 : -1;
   const Vec<2> up = -scene.params.gravity.normalized();
@@ -151,7 +146,7 @@ void check_holes(const Scene &scene) {
       continue;
     const int samples = std::max(2, static_cast<int>(e.norm() / scene.params.spacing));
     for (int m = 0; m < samples; ++m)
-      check_hole(scene, segments, a + (m + 0.5) / samples * e);
+      check_hole(scene, a + (m + 0.5) / samples * e);
   }
 }
 
@@ -167,7 +162,24 @@ std::vector<double> hydrostatic_pressure(const FluidParams &params,
   return pressure;
 }
 
+void check_water(const FluidParams &params) {
+  const double area = std::abs(signed_area(params.water));
+  const Box box = bounding_box(params.water);
+  const Vec<2> size = (box.high - box.low) / params.spacing;
+  constexpr double most_points = 2e8;
+  check(area > 0, "water_m: the corners enclose no area; is an edge missing?");
+  check(size.prod() <= most_points,
+        "water_m spans {:.3g} x {:.3g} points at a spacing of {} m, at most {:.0e} are handled; use "
+        "a larger spacing_m",
+        size.x(), size.y(), params.spacing, most_points);
+  for (const Vec<2> &corner : params.water)
+    check(corner.x() < params.outlet_x,
+          "the corner ({}, {}) m of water_m lies beyond the outlet at outlet_x_m = {}", corner.x(),
+          corner.y(), params.outlet_x);
+}
+
 Points fill(const FluidParams &params) {
+  check_water(params);
   Points points;
   points.position =
       lattice_in(params.water, params.spacing, params.lattice_angle * std::numbers::pi / 180);
@@ -188,14 +200,35 @@ Points fill(const FluidParams &params) {
 
 } // namespace
 
+double volume_error(const Scene &scene) {
+  const double spacing = scene.params.spacing, area = std::abs(signed_area(scene.params.water));
+  return scene.initial.points.size() * spacing * spacing / area - 1;
+}
+
+void check_clear_of_walls(const Scene &scene, double tolerance) {
+  const double spacing = scene.params.spacing;
+  const auto &position = scene.initial.points.position;
+  const Grid grid = grid_over(scene.initial.points, 4 * spacing);
+  SegmentGrid near;
+  find_near_segments(scene.walls, grid, spacing, near);
+  for (const Vec<2> &x : position)
+    for (const Projection &p :
+         project_on_walls(scene.walls, near.near(grid.cell(x)), x, spacing))
+      check(p.distance > -tolerance,
+            "the water overlaps wall '{}': a point at ({:.6g}, {:.6g}) m lies {:.3g} m behind it; "
+            "correct water_m or the wall (the fluid lies on the left of its points_m)",
+            scene.walls.names[scene.walls.segments[p.segment].wall], x.x(), x.y(), -p.distance);
+}
+
 Scene read_scene(const Config &config) {
   Scene scene;
   scene.params = config.read<FluidParams>("fluid");
   scene.walls = read_walls(config);
   scene.gauges = config.read_all<GaugeParams>("fluid.gauge");
+  check_names(scene.gauges, "gauge");
   check(!scene.walls.segments.empty(), "{}: the scene has no [[fluid.wall]]", config.file_name());
   scene.initial.points = fill(scene.params);
-  check_clear_of_walls(scene);
+  check_clear_of_walls(scene, 0);
   if (!scene.params.open_sides && scene.params.gravity.norm() > 0)
     check_holes(scene);
   return scene;

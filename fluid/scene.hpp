@@ -45,7 +45,9 @@ struct FluidParams {
         .one_of({"move", "stay"});
     read("start_state", start_state,
          "file fluid_state.h5 of a run to go on from, instead of filling water_m");
-    read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative").positive();
+    read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")
+        .at_least(1e-12)
+        .at_most(1e-2);
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
     read("noise_damping", noise_damping,
          "decay of velocity modes at the scale of the points, in sqrt(g / spacing)")
@@ -88,7 +90,7 @@ struct GaugeParams {
   double x = 0;
 
   template <class Reader> void describe(Reader &read) {
-    read.required("name", name, "name of the gauge");
+    read.required("name", name, "name of the gauge: letters, digits, _ and -");
     read.required("x_m", x, "place of the gauge");
   }
 };
@@ -99,6 +101,13 @@ struct Scene {
   std::vector<GaugeParams> gauges;
   FluidState initial;
 };
+
+/// Area that the points stand for minus that of water_m, over the latter: what the lattice misses.
+double volume_error(const Scene &scene);
+
+/// Throws UserError, naming the point and the wall, if a point lies farther behind a wall than
+/// `tolerance` [m].
+void check_clear_of_walls(const Scene &scene, double tolerance);
 
 /// Reads the tables of the fluid and fills the water. Throws UserError, with place and numbers, on
 /// water that overlaps a wall, a hole in the walls below the water line, or too few points.

@@ -3,6 +3,7 @@
 
 #include "bridge/base/check.hpp"
 
+#include <cmath>
 #include <hdf5.h>
 #include <string>
 #include <type_traits>
@@ -53,24 +54,13 @@ template <> struct Layout<Vec<2>> {
   static constexpr int components = 2;
 };
 
-// body(name, array) for every array of the points, and body(name, number) for every counter:
-// the one list that writing and reading share.
-template <class Points, class Body> void for_each_array(Points &points, Body &&body) {
-  body("position", points.position);
-  body("velocity", points.velocity);
-  body("previous_velocity", points.previous_velocity);
-  body("shift", points.shift);
-  body("shift_velocity", points.shift_velocity);
-  body("pressure", points.pressure);
-  body("id", points.id);
-  body("at_surface", points.at_surface);
-}
-
+// body(name, number) for every number of a state: the one list that writing and reading share.
 template <class Saved, class Body> void for_each_number(Saved &saved, Body &&body) {
   auto &state = saved.state;
   body("spacing_m", saved.spacing);
   body("time_s", saved.time);
   body("step", state.step);
+  body("step_size_s", state.step_size);
   body("wall_returns", state.wall_returns);
   body("outflow_points", state.outflow_points);
   body("lost_points", state.lost_points);
@@ -142,7 +132,7 @@ public:
   }
 
   SavedState read() {
-    check(H5Aexists(file_, "format") > 0, "{}: not a state that sluice-fluid wrote", name_);
+    check(read_text("format") == format_name, "{}: not a state that sluice-fluid wrote", name_);
     std::int32_t version = 0;
     read_number("version", version);
     check(version == format_version, "{}: written in version {} of the format, this program reads "
@@ -154,14 +144,38 @@ public:
     check(group.is_valid(), "{}: holds no points", name_);
     for_each_array(saved.state.points,
                    [&](const char *name, auto &x) { read_array(group, name, x); });
+    check_values(saved.state.points);
     return saved;
   }
 
 private:
+  // The text of an attribute, "" where there is none.
+  std::string read_text(const char *name) const {
+    if (H5Aexists(file_, name) <= 0)
+      return "";
+    const Handle attribute(H5Aopen(file_, name, H5P_DEFAULT), H5Aclose);
+    const Handle type(H5Aget_type(attribute), H5Tclose);
+    if (H5Tget_class(type) != H5T_STRING || H5Tis_variable_str(type) > 0)
+      return "";
+    std::string text(H5Tget_size(type), '\0');
+    return H5Aread(attribute, type, text.data()) >= 0 ? text : "";
+  }
+
   template <class T> void read_number(const char *name, T &x) {
     const Handle attribute(H5Aopen(file_, name, H5P_DEFAULT), H5Aclose);
     check(attribute.is_valid() && H5Aread(attribute, type_of<T>(), &x) >= 0,
           "{}: the attribute '{}' is missing or damaged", name_, name);
+  }
+
+  void check_values(const Points &points) const {
+    for (int i = 0; i < points.size(); ++i) {
+      check(points.position[i].allFinite() && points.velocity[i].allFinite() &&
+                points.previous_velocity[i].allFinite() && std::isfinite(points.pressure[i]),
+            "{}: point {} has a value that is not finite", name_, i);
+      check(points.at_surface[i] <= SurfaceMemory::released,
+            "{}: point {} has the surface mark {}, which does not exist", name_, i,
+            static_cast<int>(points.at_surface[i]));
+    }
   }
 
   template <class T> void read_array(hid_t group, const char *name, std::vector<T> &values) {
@@ -212,8 +226,15 @@ void write_state(const std::filesystem::path &file, const SavedState &saved) {
   const Quiet quiet;
   std::filesystem::path unfinished = file;
   unfinished += ".part";
-  Writer(unfinished).write(saved);
-  std::filesystem::rename(unfinished, file);
+  std::error_code error;
+  try {
+    Writer(unfinished).write(saved);
+  } catch (const UserError &) {
+    std::filesystem::remove(unfinished, error);
+    throw;
+  }
+  std::filesystem::rename(unfinished, file, error);
+  check(!error, "{}: cannot be replaced: {}", file.string(), error.message());
 }
 
 SavedState read_state(const std::filesystem::path &file) {

@@ -14,19 +14,13 @@ FluidSolver::FluidSolver(const Scene &scene)
     : state(scene.initial), walls(scene.walls), params_(scene.params) {
   pressure_params_.density = params_.density;
   pressure_params_.row_guard = params_.row_guard;
-  domain_low_ = Vec<2>::Constant(1e300);
-  domain_high_ = Vec<2>::Constant(-1e300);
-  for (const Vec<2> &x : walls.position) {
-    domain_low_ = domain_low_.cwiseMin(x);
-    domain_high_ = domain_high_.cwiseMax(x);
-  }
   nodal_forces_.assign(walls.position.size(), Vec<2>::Zero());
 }
 
 void FluidSolver::begin_step(double dt) {
   dt_ = dt;
   report_ = {};
-  timer("move", [&] { move_points(state.points, dt); });
+  timer("move", [&] { move_points(state.points, dt, state.step_size); });
   freeze_cloud();
   timer("viscosity", [&] { predict_velocity(); });
   assemble();
@@ -38,6 +32,7 @@ void FluidSolver::iterate() {
   const SolveResult result = timer("pressure solve", [&] {
     SolveOptions options;
     options.relative_tolerance = params_.pressure_tolerance;
+    options.null_space = problem_.has_open_point ? NullSpace::none : NullSpace::constants;
     return bicgstab(scaled_, problem_.source, points.pressure, multigrid_, options, memory_);
   });
   check(result.converged,
@@ -69,26 +64,20 @@ void FluidSolver::end_step() {
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
   });
   ++state.step;
+  state.step_size = dt_;
 }
 
 namespace {
 
 void remove_points(Points &points, const std::vector<char> &leaves) {
-  const auto compact = [&](auto &values) {
+  const auto compact = [&](const char *, auto &values) {
     std::size_t n = 0;
     for (std::size_t i = 0; i < values.size(); ++i)
       if (!leaves[i])
         values[n++] = values[i];
     values.resize(n);
   };
-  compact(points.position);
-  compact(points.velocity);
-  compact(points.previous_velocity);
-  compact(points.shift);
-  compact(points.shift_velocity);
-  compact(points.pressure);
-  compact(points.id);
-  compact(points.at_surface);
+  for_each_array(points, compact);
 }
 
 } // namespace
@@ -100,14 +89,19 @@ double FluidSolver::energy_of_point(const Vec<2> &u, const Vec<2> &x) const {
 
 void FluidSolver::leave_through_outlet() {
   Points &points = state.points;
+  Vec<2> low = walls.position.front(), high = low;
+  for (const Vec<2> &x : walls.position) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  const double margin = params_.spacing;
   std::vector<char> leaves(points.size(), 0);
   bool any = false;
   for (int i = 0; i < points.size(); ++i) {
     const Vec<2> &x = points.position[i];
     const bool is_out = x.x() > params_.outlet_x;
-    const bool is_lost = !is_out && (x.x() < domain_low_.x() - cloud_.spacing ||
-                                     x.x() > domain_high_.x() + cloud_.spacing ||
-                                     x.y() < domain_low_.y() - cloud_.spacing);
+    const bool is_lost = !is_out && (x.x() < low.x() - margin || x.x() > high.x() + margin ||
+                                     x.y() < low.y() - margin);
     state.outflow_points += is_out;
     state.lost_points += is_lost;
     leaves[i] = is_out || is_lost;
@@ -120,6 +114,10 @@ void FluidSolver::leave_through_outlet() {
   }
   if (any)
     remove_points(points, leaves);
+  check(points.size() > 0,
+        "step {}: no water is left in the scene ({} points left through the outlet, {} were lost); "
+        "end the run earlier",
+        state.step + 1, state.outflow_points, state.lost_points);
 }
 
 void FluidSolver::freeze_cloud() {

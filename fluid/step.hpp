@@ -62,7 +62,6 @@ private:
 
   FluidParams params_;
   PressureParams pressure_params_;
-  Vec<2> domain_low_, domain_high_;
   double dt_ = 0;
   Cloud cloud_;
   PressureProblem problem_;

@@ -30,8 +30,6 @@ public:
   void row(int i) const {
     const auto neighbours = cloud_.neighbours.of(i);
     const int start = problem_.matrix.row_start[i];
-    problem_.matrix.column[start] = i;
-    std::copy(neighbours.begin(), neighbours.end(), problem_.matrix.column.begin() + start + 1);
     double *entry = problem_.matrix.value.data() + start;
     std::fill(entry, entry + neighbours.size() + 1, 0.0);
     entry[0] = 1;
@@ -105,16 +103,9 @@ private:
 };
 
 void lay_out(const Cloud &cloud, ViscousProblem &problem) {
-  const int n = static_cast<int>(cloud.kind.size());
-  problem.matrix.row_start.resize(n + 1);
-  problem.matrix.row_start[0] = 0;
-  for (int i = 0; i < n; ++i)
-    problem.matrix.row_start[i + 1] =
-        problem.matrix.row_start[i] + 1 + cloud.neighbours.count[i];
-  problem.matrix.column.resize(problem.matrix.row_start[n]);
-  problem.matrix.value.resize(problem.matrix.row_start[n]);
+  lay_out_rows(cloud.neighbours, problem.matrix);
   for (auto *v : {&problem.source_x, &problem.source_y, &problem.x, &problem.y})
-    v->resize(n);
+    v->resize(cloud.kind.size());
 }
 
 int solve(const ViscousProblem &problem, std::span<const double> source, std::span<double> x,

@@ -27,7 +27,7 @@ struct WallQuadrature {
     double weight; // sum to one per sample
   };
   std::vector<Sample> samples;
-  std::vector<Contribution> contributions; // `point` counts in `feeders`
+  std::vector<Contribution> contributions; // `feeder` counts in `feeders`
   std::vector<int> feeders;                // the fluid points that contribute, each once
   std::vector<int> feeder_of_point;        // -1: none
 };

@@ -5,10 +5,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sluice::fluid {
 
 namespace {
+
+constexpr double cos_30_degrees = 0.866;
 
 struct Foot {
   Vec<2> point;
@@ -49,7 +52,6 @@ bool is_sharp_edge(const Walls &walls, int segment, const Foot &foot) {
   const WallSegment &s = walls.segments[segment];
   if (foot.t > 0 && foot.t < 1)
     return false;
-  constexpr double cos_30_degrees = 0.866;
   return foot.t <= 0 || s.next < 0 ||
          walls.tangent(s).dot(walls.tangent(walls.segments[s.next])) < cos_30_degrees;
 }
@@ -67,19 +69,35 @@ Projection make_projection(const Walls &walls, int segment, const Foot &foot, co
           is_sharp_edge(walls, segment, foot)};
 }
 
-void insert_by_distance(PointWalls &found, const Projection &p) {
-  constexpr double cos_30_degrees = 0.866;
-  for (int k = 0; k < found.count; ++k)
-    if (found.projection[k].normal.dot(p.normal) > cos_30_degrees) {
-      if (std::abs(p.distance) < std::abs(found.projection[k].distance))
-        found.projection[k] = p;
+// Candidates of one point, nearest first: their order on the outlines has no influence.
+class NearestFirst {
+public:
+  void insert(const Projection &p) {
+    if (count_ == most && std::abs(p.distance) >= std::abs(all_[most - 1].distance))
       return;
+    int k = count_ < most ? count_++ : most - 1;
+    for (; k > 0 && std::abs(all_[k - 1].distance) > std::abs(p.distance); --k)
+      all_[k] = all_[k - 1];
+    all_[k] = p;
+  }
+  /// The nearest of each direction.
+  PointWalls by_direction() const {
+    PointWalls found;
+    for (int k = 0; k < count_ && found.count < static_cast<int>(found.projection.size()); ++k) {
+      const bool is_new = std::none_of(found.begin(), found.end(), [&](const Projection &p) {
+        return p.normal.dot(all_[k].normal) > cos_30_degrees;
+      });
+      if (is_new)
+        found.projection[found.count++] = all_[k];
     }
-  if (found.count < static_cast<int>(found.projection.size()))
-    found.projection[found.count++] = p;
-  else if (std::abs(p.distance) < std::abs(found.projection.back().distance))
-    found.projection.back() = p;
-}
+    return found;
+  }
+
+private:
+  static constexpr int most = 12;
+  int count_ = 0;
+  std::array<Projection, most> all_;
+};
 
 // The far face of a plate is behind its near face: not a wall of this point.
 void drop_far_faces(PointWalls &found) {
@@ -102,19 +120,23 @@ void drop_far_faces(PointWalls &found) {
 
 PointWalls project_on_walls(const Walls &walls, std::span<const int> candidates, const Vec<2> &x,
                             double reach) {
-  PointWalls found;
+  NearestFirst nearest;
   for (const int s : candidates) {
     const Foot foot = foot_on(walls, s, x);
     if ((x - foot.point).squaredNorm() > reach * reach || !is_local_minimum(walls, s, foot, x))
       continue;
-    insert_by_distance(found, make_projection(walls, s, foot, x));
+    nearest.insert(make_projection(walls, s, foot, x));
   }
-  std::sort(found.projection.begin(), found.projection.begin() + found.count,
-            [](const Projection &p, const Projection &q) {
-              return std::abs(p.distance) < std::abs(q.distance);
-            });
+  PointWalls found = nearest.by_direction();
   drop_far_faces(found);
   return found;
+}
+
+double distance_to_walls(const Walls &walls, const Vec<2> &x) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (int s = 0; s < static_cast<int>(walls.segments.size()); ++s)
+    nearest = std::min(nearest, (foot_on(walls, s, x).point - x).norm());
+  return nearest;
 }
 
 bool is_hidden(const Walls &walls, std::span<const int> candidates, const Vec<2> &from,
@@ -182,25 +204,49 @@ namespace {
 
 } // namespace
 
+namespace {
+
+// Vertices closer than this are one [m].
+constexpr double same_place = 1e-9;
+
+struct SegmentEnd {
+  Vec<2> place;
+  int segment;
+  bool is_start;
+};
+
+void link(Walls &walls, const SegmentEnd &p, const SegmentEnd &q) {
+  WallSegment &s = walls.segments[p.segment], &t = walls.segments[q.segment];
+  if (p.is_start == q.is_start)
+    refuse_opposed(walls, s, t, p.is_start ? s.a : s.b);
+  WallSegment &from = p.is_start ? t : s, &to = p.is_start ? s : t;
+  check(from.next < 0 && to.previous < 0,
+        "walls '{}' and '{}': more than two segments meet at ({}, {}) m; "
+        "walls must be simple outlines with the fluid on their left",
+        walls.names[from.wall], walls.names[to.wall], p.place.x(), p.place.y());
+  from.next = p.is_start ? p.segment : q.segment;
+  to.previous = p.is_start ? q.segment : p.segment;
+}
+
+} // namespace
+
 void link_outlines(Walls &walls) {
-  const int n = static_cast<int>(walls.segments.size());
-  const auto coincide = [&](int v, int w) {
-    return v == w || (walls.position[v] - walls.position[w]).norm() < 1e-9;
-  };
-  for (int k = 0; k < n; ++k)
-    for (int m = 0; m < n; ++m) {
-      WallSegment &from = walls.segments[k], &to = walls.segments[m];
-      if (k < m && (coincide(from.a, to.a) || coincide(from.b, to.b)))
-        refuse_opposed(walls, from, to, coincide(from.a, to.a) ? from.a : from.b);
-      if (k == m || !coincide(from.b, to.a))
-        continue;
-      const Vec<2> &x = walls.position[from.b];
-      check(from.next < 0 && to.previous < 0,
-            "walls '{}' and '{}': more than two segments meet at ({}, {}) m; "
-            "walls must be simple outlines with the fluid on their left",
-            walls.names[from.wall], walls.names[to.wall], x.x(), x.y());
-      from.next = m;
-      to.previous = k;
+  std::vector<SegmentEnd> ends;
+  for (int k = 0; k < static_cast<int>(walls.segments.size()); ++k) {
+    ends.push_back({walls.position[walls.segments[k].a], k, true});
+    ends.push_back({walls.position[walls.segments[k].b], k, false});
+  }
+  // Along a direction that no wall of a scene has by design: few ends fall on one spot.
+  const auto along = [](const SegmentEnd &e) { return Vec<2>(0.5403, 0.8415).dot(e.place); };
+  std::sort(ends.begin(), ends.end(), [&](const SegmentEnd &p, const SegmentEnd &q) {
+    return along(p) < along(q);
+  });
+  for (std::size_t k = 0; k < ends.size(); ++k)
+    for (std::size_t m = k + 1; m < ends.size(); ++m) {
+      if (along(ends[m]) - along(ends[k]) > 1.01 * same_place)
+        break;
+      if (ends[m].segment != ends[k].segment && (ends[m].place - ends[k].place).norm() < same_place)
+        link(walls, ends[k], ends[m]);
     }
 }
 

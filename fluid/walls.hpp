@@ -49,7 +49,8 @@ inline Vec<2> wall_velocity(const Walls &walls, const Projection &p) {
   return (1 - p.t) * walls.velocity[s.a] + p.t * walls.velocity[s.b];
 }
 
-/// The projections of one point, nearest first; at most one per direction within 30 degrees.
+/// The projections of one point, nearest first: the nearest three directions that differ by more
+/// than 30 degrees, of each the nearest wall.
 struct PointWalls {
   int count = 0;
   std::array<Projection, 3> projection;
@@ -71,6 +72,9 @@ void find_near_segments(const Walls &walls, const Grid &grid, double reach, Segm
 /// the outlines, nearest first.
 PointWalls project_on_walls(const Walls &walls, std::span<const int> candidates, const Vec<2> &x,
                             double reach);
+
+/// Distance from `x` to the nearest of all segments [m].
+double distance_to_walls(const Walls &walls, const Vec<2> &x);
 
 /// True when the straight line between two points crosses one of the segments.
 bool is_hidden(const Walls &walls, std::span<const int> candidates, const Vec<2> &from,

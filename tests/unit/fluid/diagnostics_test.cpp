@@ -40,10 +40,42 @@ TEST(CentreLine, OfABentGateTellsTheTankFromTheOutside) {
 TEST(WaterLevel, IsTheTopOfTheConnectedColumnAndIgnoresDropsAboveIt) {
   const double h = 0.1;
   auto x = testing::lattice(10, 20, h);
-  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h), 2.0, 1e-12);
+  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, 0.0), 2.0, 1e-12);
   x.emplace_back(0.5, 3.0);
-  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h), 2.0, 1e-12);
-  EXPECT_EQ(water_level(testing::points_at(x), 1.3, h), 0);
+  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, 0.0), 2.0, 1e-12);
+  EXPECT_EQ(water_level(testing::points_at(x), 1.3, h, 0.0), 0);
+}
+
+TEST(WaterLevel, DoesNotCareHowHighTheFloorIs) {
+  const double h = 0.1;
+  for (const double floor : {-7.0, 0.0, 3.0}) {
+    auto x = testing::lattice(10, 20, h);
+    for (Vec<2> &p : x)
+      p.y() += floor;
+    EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, floor), floor + 2, 1e-12);
+    EXPECT_EQ(water_level(testing::points_at(x), 1.3, h, floor), floor); // dry
+    EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, std::nullopt), floor + 2, 1e-12);
+    EXPECT_TRUE(std::isnan(water_level(testing::points_at(x), 1.3, h, std::nullopt)));
+  }
+}
+
+TEST(WaterLevel, ADropHighAboveADryFloorIsNoColumn) {
+  EXPECT_EQ(water_level(testing::points_at({{0.5, 2}}), 0.5, 0.1, 0.0), 0);
+}
+
+TEST(WaterLevel, TheFloorIsTheLowestWallWithTheFluidAboveIt) {
+  Walls walls;
+  testing::add_polyline(walls, {{0, 5}, {0, -2}, {4, -1}, {4, 5}}); // a tank whose floor rises
+  testing::add_polyline(walls, {{3, 1}, {2, 1}});                   // a plate's lower face
+  testing::add_polyline(walls, {{2, 1.2}, {3, 1.2}});               // and its upper one
+  EXPECT_NEAR(floor_at(walls, 2.5).value(), -1.375, 1e-12);
+  EXPECT_FALSE(floor_at(walls, 6));
+}
+
+TEST(CentreLine, DoesNotExistForAFloorThatMoves) {
+  Walls walls = testing::polyline({{0, 1}, {0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}});
+  walls.coupled_vertices = {1, 2, 3, 4};
+  EXPECT_FALSE(CentreLine(walls).exists());
 }
 
 TEST(Integrals, OfStillWaterAreItsVolumeAndItsWeightsPotential) {

@@ -39,6 +39,32 @@ TEST(Scene, RefusesWaterThatOverlapsAWallWithNameAndPlace) {
   EXPECT_TRUE(contains(message, "0.002 m behind")) << message;
 }
 
+TEST(Scene, ALatticeFillsAnyConvexWaterWhereverItLiesAndHoweverItIsTurned) {
+  const std::string text = replaced(testing::gate_tank(), "[0, 0]", "[0.0, 0.0]");
+  for (const char *angle : {"-45", "-10", "0", "30", "45"}) {
+    const Scene scene = scene_of(text, {std::string("fluid.lattice_angle_deg=") + angle});
+    EXPECT_NEAR(volume_error(scene), 0, 0.035) << angle; // half a point per spacing of the outline
+  }
+}
+
+TEST(Scene, RefusesWaterBeyondTheOutlet) {
+  const std::string message =
+      message_of([] { scene_of(testing::gate_tank(), {"fluid.outlet_x_m=0.05"}); });
+  EXPECT_TRUE(contains(message, "(0.1, 0) m of water_m lies beyond the outlet")) << message;
+}
+
+TEST(Scene, RefusesANumberOfPointsThatNoMachineHolds) {
+  const std::string message =
+      message_of([] { scene_of(testing::gate_tank(), {"fluid.spacing_m=1e-9"}); });
+  EXPECT_TRUE(contains(message, "1e+08 x 1.4e+08 points")) << message;
+}
+
+TEST(Scene, RefusesTwoWallsOfOneName) {
+  const std::string message =
+      message_of([] { scene_of(replaced(testing::gate_tank(), "\"gate\"", "\"tank\"")); });
+  EXPECT_TRUE(contains(message, "two walls are called 'tank'")) << message;
+}
+
 TEST(Scene, RefusesAHoleBelowTheWaterLineWithItsPlace) {
   const std::string text =
       replaced(testing::gate_tank(), "[[0, 0.3], [0, 0], [0.8, 0]]", "[[0, 0.3], [0, 0.05]]");

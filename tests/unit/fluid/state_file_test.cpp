@@ -37,6 +37,7 @@ void expect_same_bits(const FluidState &a, const FluidState &b) {
   EXPECT_EQ(a.points.id, b.points.id);
   EXPECT_EQ(a.points.at_surface, b.points.at_surface);
   EXPECT_EQ(a.step, b.step);
+  EXPECT_EQ(a.step_size, b.step_size);
   EXPECT_EQ(a.wall_returns, b.wall_returns);
   EXPECT_EQ(a.outflow_points, b.outflow_points);
   EXPECT_EQ(a.lost_points, b.lost_points);
@@ -106,6 +107,14 @@ TEST(StateFile, EveryTruncationIsRefused) {
     std::filesystem::resize_file(cut, size * k / 40);
     EXPECT_NE(complaint(cut), "") << "cut at " << size * k / 40 << " of " << size << " bytes";
   }
+}
+
+TEST(StateFile, APointThatIsNoNumberIsRefusedByIndex) {
+  const TemporaryFolder folder;
+  FluidState state = state_after(1);
+  state.points.velocity[7].y() = std::nan("");
+  write_state(folder.path() / "state.h5", {state, 5e-4, 0.004});
+  EXPECT_NE(complaint(folder.path() / "state.h5").find("point 7 "), std::string::npos);
 }
 
 TEST(StateFile, ArraysOfUnequalLengthAreRefused) {

@@ -82,8 +82,25 @@ TEST(Walls, AMildlyConvexPolylineGivesOneProjectionEverywhere) {
   }
 }
 
-// Disabled: the far face of a plate that is thinner than the kernel is found from behind, through
-// the plate, and its points count as lying outside of the fluid.
+// Four walls around a point, three places: the nearest three, whatever the order of the segments.
+TEST(Walls, TheNearestThreeDirectionsDoNotDependOnTheOrderOfTheSegments) {
+  Walls walls;
+  testing::add_polyline(walls, {{0.4, 2}, {0.4, -2}}, "left");   // 0.1 away
+  testing::add_polyline(walls, {{-2, 0.3}, {2, 0.3}}, "below");  // 0.2
+  testing::add_polyline(walls, {{0.8, -2}, {0.8, 2}}, "right");  // 0.3
+  testing::add_polyline(walls, {{2, 0.9}, {-2, 0.9}}, "above");  // 0.4
+  testing::add_polyline(walls, {{0.35, 2}, {0.35, -2}}, "left, farther"); // 0.15
+  const Vec<2> x(0.5, 0.5);
+  std::vector<int> order = every_segment(walls);
+  do {
+    const PointWalls found = project_on_walls(walls, order, x, 1);
+    ASSERT_EQ(found.count, 3);
+    for (int k = 0; k < 3; ++k)
+      ASSERT_NEAR(found.projection[k].distance, 0.1 * (k + 1), round_off);
+  } while (std::next_permutation(order.begin(), order.end()));
+}
+
+// Seen through the plate, the point would count as lying outside of the fluid.
 TEST(Walls, TheFarFaceOfAThinPlateHasNoProjection) {
   const Walls plate = polyline({{0.1, 2}, {0.1, 0}, {0, 0}, {0, 2}});
   const PointWalls found = project(plate, {-0.05, 1}, 0.3);
@@ -150,7 +167,6 @@ TEST(Walls, LinkingRefusesABranchingVertexAndSaysWhere) {
   EXPECT_TRUE(testing::contains(message, "(0.25, 0.5)")) << message;
 }
 
-// Disabled: link_outlines leaves such walls unlinked, which its description says it refuses.
 TEST(Walls, LinkingRefusesTwoWallsThatRunAgainstEachOther) {
   Walls walls;
   testing::add_polyline(walls, {{0, 1}, {0, 0}}, "left");
