@@ -51,15 +51,6 @@ inline int number_of_threads() {
 #endif
 }
 
-/// Which of the number_of_threads() threads runs the body, to pick scratch memory by.
-inline int thread_index() {
-#ifdef _OPENMP
-  return omp_get_thread_num();
-#else
-  return 0;
-#endif
-}
-
 /// Calls body(b) for b in [0, n), each b once, in parallel if `worthwhile`.
 template <class Body> void for_each_task(int n, bool worthwhile, Body &&body) {
 #ifdef _OPENMP
