@@ -15,84 +15,86 @@ namespace sluice::fluid {
 
 namespace {
 
-// The map of a whole step jumps where a point changes its kind with the position of the wall, and an
-// iteration across a jump has no limit. From here on the cloud stays as the last full step built it:
-// the map is affine, and what is left to correct in the wall's position far below a spacing.
+// The map of a whole step jumps where a point changes its kind with the position of the wall, and
+// an iteration across a jump has no limit. From here on the cloud stays as the last full step built
+// it: the map is affine, and what is left to correct in the wall's position far below a spacing.
 constexpr int most_full_iterations = 8;
 
 /// The coupled walls as the bridge sees them, and the way back.
-class CoupledSurface {
+template <int dim> class CoupledSurface {
 public:
-  explicit CoupledSurface(const Walls &walls)
-      : reference_(walls.position), displacement_(walls.position.size(), Vec<2>::Zero()) {
-    values_.resize(2 * walls.coupled_vertices.size());
+  explicit CoupledSurface(const Walls<dim> &walls)
+      : reference_(walls.position), displacement_(walls.position.size(), Vec<dim>::Zero()) {
+    values_.resize(dim * walls.coupled_vertices.size());
   }
   /// Per wall vertex, as last read [m].
-  const std::vector<Vec<2>> &displacement() const { return displacement_; }
+  const std::vector<Vec<dim>> &displacement() const { return displacement_; }
 
-  bridge::InterfaceMesh mesh(const Walls &walls) const {
+  bridge::InterfaceMesh mesh(const Walls<dim> &walls) const {
     bridge::InterfaceMesh mesh;
+    mesh.dim = mesh.nodes_per_face = dim;
     std::vector<int> node(walls.position.size(), -1);
     for (std::size_t k = 0; k < walls.coupled_vertices.size(); ++k) {
-      const Vec<2> &x = walls.position[walls.coupled_vertices[k]];
-      mesh.positions.insert(mesh.positions.end(), {x.x(), x.y()});
+      const Vec<dim> &x = walls.position[walls.coupled_vertices[k]];
+      mesh.positions.insert(mesh.positions.end(), x.begin(), x.end());
       node[walls.coupled_vertices[k]] = static_cast<int>(k);
     }
-    for (const int s : walls.coupled_segments)
-      for (const int v : {walls.segments[s].a, walls.segments[s].b})
+    for (const int f : walls.coupled_faces)
+      for (const int v : walls.faces[f].vertex)
         mesh.faces.push_back(node[v]);
     return mesh;
   }
 
-  void read_positions(const bridge::Participant &bridge, double relative_time, Walls &walls) {
+  void read_positions(const bridge::Participant &bridge, double relative_time, Walls<dim> &walls) {
     bridge.read_data("displacement", relative_time, values_);
     for (std::size_t k = 0; k < walls.coupled_vertices.size(); ++k) {
       const int v = walls.coupled_vertices[k];
-      displacement_[v] = {values_[2 * k], values_[2 * k + 1]};
+      displacement_[v] = value(k);
       walls.position[v] = reference_[v] + displacement_[v];
     }
   }
 
-  void read_velocities(const bridge::Participant &bridge, double relative_time, Walls &walls) {
+  void read_velocities(const bridge::Participant &bridge, double relative_time, Walls<dim> &walls) {
     bridge.read_data("velocity", relative_time, values_);
     for (std::size_t k = 0; k < walls.coupled_vertices.size(); ++k)
-      walls.velocity[walls.coupled_vertices[k]] = {values_[2 * k], values_[2 * k + 1]};
+      walls.velocity[walls.coupled_vertices[k]] = value(k);
   }
 
-  void write_forces(bridge::Participant &bridge, const FluidSolver &solver) {
-    for (std::size_t k = 0; k < values_.size() / 2; ++k) {
-      const Vec<2> &f = solver.nodal_forces()[solver.walls.coupled_vertices[k]];
-      values_[2 * k] = f.x();
-      values_[2 * k + 1] = f.y();
+  void write_forces(bridge::Participant &bridge, const FluidSolver<dim> &solver) {
+    for (std::size_t k = 0; k < values_.size() / dim; ++k) {
+      const Vec<dim> &f = solver.nodal_forces()[solver.walls.coupled_vertices[k]];
+      std::copy(f.begin(), f.end(), values_.begin() + static_cast<std::ptrdiff_t>(dim * k));
     }
     bridge.write_data("force", values_);
   }
 
 private:
-  std::vector<Vec<2>> reference_, displacement_;
+  Vec<dim> value(std::size_t k) const { return Vec<dim>(&values_[dim * k]); }
+
+  std::vector<Vec<dim>> reference_, displacement_;
   std::vector<double> values_;
 };
 
 /// A scene and the time of its first state.
-struct Start {
-  Scene scene;
+template <int dim> struct Start {
+  Scene<dim> scene;
   double time = 0;
 };
 
-bool has_partner(const Scene &scene) {
+template <int dim> bool has_partner(const Scene<dim> &scene) {
   return !scene.walls.coupled_vertices.empty() && scene.params.coupled_walls == "move";
 }
 
 /// The water as filled, or as another run left it.
-Start start_of(const Config &config, const bridge::CaseSettings &settings) {
-  Start start{.scene = read_scene(config)};
-  const FluidParams &params = start.scene.params;
+template <int dim> Start<dim> start_of(const Config &config, const bridge::CaseSettings &settings) {
+  Start<dim> start{.scene = read_scene<dim>(config)};
+  const FluidParams<dim> &params = start.scene.params;
   if (params.start_state.empty())
     return start;
-  SavedState saved = read_state(params.start_state);
+  SavedState<dim> saved = read_state<dim>(params.start_state);
   check(std::abs(saved.spacing - params.spacing) <= 1e-12 * params.spacing,
-        "{}: its points are {} m apart, fluid.spacing_m is {} m", params.start_state,
-        saved.spacing, params.spacing);
+        "{}: its points are {} m apart, fluid.spacing_m is {} m", params.start_state, saved.spacing,
+        params.spacing);
   check(!has_partner(start.scene),
         "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s",
         saved.time);
@@ -105,7 +107,8 @@ Start start_of(const Config &config, const bridge::CaseSettings &settings) {
   return start;
 }
 
-void check_folder(const FluidParams &params, const std::filesystem::path &folder) {
+template <int dim>
+void check_folder(const FluidParams<dim> &params, const std::filesystem::path &folder) {
   if (params.start_state.empty())
     return;
   const auto source = std::filesystem::absolute(params.start_state).parent_path();
@@ -115,12 +118,12 @@ void check_folder(const FluidParams &params, const std::filesystem::path &folder
 }
 
 // A lattice that does not fit the corners of the water holds more or less of it.
-void note_volume_error(const Scene &scene) {
+template <int dim> void note_volume_error(const Scene<dim> &scene) {
   constexpr double worth_a_note = 0.01;
   const double error = volume_error(scene);
   if (scene.params.start_state.empty() && std::abs(error) > worth_a_note)
     fmt::print(stderr,
-               "fluid: the points stand for {:+.1f} % of the area of water_m: its edges are no "
+               "fluid: the points stand for {:+.1f} % of the volume of water_m: its edges are no "
                "multiples of spacing_m = {} m\n",
                100 * error, scene.params.spacing);
 }
@@ -150,18 +153,19 @@ private:
 };
 
 /// One step alone or one window with a partner.
-class Run {
+template <int dim> class Run {
 public:
   Run(const Config &config, const std::filesystem::path &folder)
-      : settings_(config.read<bridge::CaseSettings>("case")), start_(start_of(config, settings_)),
-        solver_(start_.scene), folder_(folder), progress_("fluid", settings_.end_time) {
+      : settings_(config.read<bridge::CaseSettings>("case")),
+        start_(start_of<dim>(config, settings_)), solver_(start_.scene), folder_(folder),
+        progress_("fluid", settings_.end_time) {
     check_folder(start_.scene.params, folder);
     note_volume_error(start_.scene);
   }
 
   void alone() {
     open_history();
-    const std::vector<Vec<2>> at_rest(solver_.walls.position.size(), Vec<2>::Zero());
+    const std::vector<Vec<dim>> at_rest(solver_.walls.position.size(), Vec<dim>::Zero());
     StepClock clock(start_.time, settings_.end_time, settings_.time_step);
     while (!clock.is_over()) {
       solver_.begin_step(clock.step_size());
@@ -174,7 +178,7 @@ public:
   }
 
   void coupled(bridge::Participant &bridge) {
-    CoupledSurface surface(solver_.walls);
+    CoupledSurface<dim> surface(solver_.walls);
     bridge.set_mesh(surface.mesh(solver_.walls));
     bridge.initialize();
     open_history();
@@ -229,28 +233,27 @@ private:
   }
 
   bridge::CaseSettings settings_;
-  Start start_;
-  FluidSolver solver_;
+  Start<dim> start_;
+  FluidSolver<dim> solver_;
   std::filesystem::path folder_;
-  std::optional<History> history_;
+  std::optional<History<dim>> history_;
   Progress progress_;
-  FluidState saved_;
-  std::vector<Vec<2>> moved_from_; // displacement of the wall vertices at the window's start [m]
+  FluidState<dim> saved_;
+  std::vector<Vec<dim>> moved_from_; // displacement of the wall vertices at the window's start [m]
 };
 
-} // namespace
-
-std::string describe(const Config &config) {
-  const Start start = start_of(config, config.read<bridge::CaseSettings>("case"));
+template <int dim> std::string describe(const Config &config) {
+  const Start<dim> start = start_of<dim>(config, config.read<bridge::CaseSettings>("case"));
   if (has_partner(start.scene))
     config.read<bridge::BridgeSettings>("bridge");
-  return fmt::format("{} points ({:+.2f} % of the area of water_m), {} wall segments",
+  return fmt::format("{} points ({:+.2f} % of the {} of water_m), {} wall {}",
                      start.scene.initial.points.size(), 100 * volume_error(start.scene),
-                     start.scene.walls.segments.size());
+                     dim == 2 ? "area" : "volume", start.scene.walls.faces.size(),
+                     dim == 2 ? "segments" : "triangles");
 }
 
-void run(const Config &config, const std::filesystem::path &folder) {
-  Run run(config, folder);
+template <int dim> void run(const Config &config, const std::filesystem::path &folder) {
+  Run<dim> run(config, folder);
   std::unique_ptr<bridge::Participant> bridge;
   const auto statistics = [&] {
     return bridge ? bridge::summary_of(bridge->statistics()) : nlohmann::json::object();
@@ -269,6 +272,19 @@ void run(const Config &config, const std::filesystem::path &folder) {
     throw;
   }
   run.write_summary("", statistics());
+}
+
+} // namespace
+
+std::string describe(const Config &config) {
+  return dimension_of(config) == 2 ? describe<2>(config) : describe<3>(config);
+}
+
+void run(const Config &config, const std::filesystem::path &folder) {
+  if (dimension_of(config) == 2)
+    run<2>(config, folder);
+  else
+    run<3>(config, folder);
 }
 
 } // namespace sluice::fluid

@@ -7,14 +7,15 @@
 
 namespace sluice::fluid {
 
-Integrals integrate(const FluidState &state, const FluidParams &params) {
-  const Points &points = state.points;
-  const double area = params.spacing * params.spacing, mass = params.density * area;
-  Integrals total;
-  total.point_volume = points.size() * area;
+template <int dim>
+Integrals<dim> integrate(const FluidState<dim> &state, const FluidParams<dim> &params) {
+  const Points<dim> &points = state.points;
+  const double volume = volume_of_point<dim>(params.spacing), mass = params.density * volume;
+  Integrals<dim> total;
+  total.point_volume = points.size() * volume;
   for (int i = 0; i < points.size(); ++i) {
-    const Vec<2> &u = points.velocity[i];
-    const Vec<2> x =
+    const Vec<dim> &u = points.velocity[i];
+    const Vec<dim> x =
         points.position[i] + 0.5 * state.step_size * (u - points.previous_velocity[i]);
     total.kinetic += 0.5 * mass * u.squaredNorm();
     total.potential -= mass * params.gravity.dot(x);
@@ -24,16 +25,16 @@ Integrals integrate(const FluidState &state, const FluidParams &params) {
   return total;
 }
 
-Integrals integrate(const FluidSolver &solver) {
-  const Points &points = solver.state.points;
-  const Cloud &cloud = solver.cloud();
+template <int dim> Integrals<dim> integrate(const FluidSolver<dim> &solver) {
+  const Points<dim> &points = solver.state.points;
+  const Cloud<dim> &cloud = solver.cloud();
   const CentreLine line(solver.walls);
-  Integrals total = integrate(solver.state, solver.params());
+  Integrals<dim> total = integrate(solver.state, solver.params());
   for (int i = 0; i < points.size(); ++i) {
-    total.volume += cloud.cell_area[i];
+    total.volume += cloud.cell_volume[i];
     if (!line.exists() || !line.is_past(points.position[i])) {
-      total.tank_volume += cloud.cell_area[i];
-      total.tank_point_volume += cloud.spacing * cloud.spacing;
+      total.tank_volume += cloud.cell_volume[i];
+      total.tank_point_volume += volume_of_point<dim>(cloud.spacing);
     }
     total.min_pressure = std::min(total.min_pressure, points.pressure[i]);
     total.max_pressure = std::max(total.max_pressure, points.pressure[i]);
@@ -41,23 +42,31 @@ Integrals integrate(const FluidSolver &solver) {
   return total;
 }
 
-bridge::InterfaceTotals interface_totals(const FluidSolver &solver, std::span<const Vec<2>> start,
-                                         std::span<const Vec<2>> end) {
-  const Walls &walls = solver.walls;
+namespace {
+
+void add_moment(double moment, bridge::InterfaceTotals &total) { total.moment[2] += moment; }
+void add_moment(const Vec<3> &moment, bridge::InterfaceTotals &total) {
+  for (int d = 0; d < 3; ++d)
+    total.moment[d] += moment[d];
+}
+
+} // namespace
+
+template <int dim>
+bridge::InterfaceTotals interface_totals(const FluidSolver<dim> &solver, VecView<dim> start,
+                                         VecView<dim> end) {
+  const Walls<dim> &walls = solver.walls;
   bridge::InterfaceTotals total;
   const auto &samples = solver.quadrature().samples;
   for (std::size_t k = 0; k < samples.size(); ++k) {
     const auto &s = samples[k];
-    const WallSegment &segment = walls.segments[s.segment];
-    const auto at = [&](std::span<const Vec<2>> v) -> Vec<2> {
-      return (1 - s.t) * v[segment.a] + s.t * v[segment.b];
-    };
-    const Vec<2> f = s.length * solver.tractions()[k];
-    const Vec<2> x = at(walls.position), from = at(start), to = at(end);
-    total.force[0] += f.x();
-    total.force[1] += f.y();
+    const auto at = [&](VecView<dim> v) { return value_at<dim>(v, walls.faces[s.face], s.shape); };
+    const Vec<dim> f = s.measure * solver.tractions()[k];
+    const Vec<dim> x = at(walls.position), from = at(start), to = at(end);
+    for (int d = 0; d < dim; ++d)
+      total.force[d] += f[d];
     total.force_magnitude += f.norm();
-    total.moment[2] += cross(x, f);
+    add_moment(cross(x, f), total);
     total.moment_magnitude += x.norm() * f.norm();
     total.work += f.dot(to - from);
     total.work_magnitude += f.norm() * (from.norm() + to.norm());
@@ -65,7 +74,7 @@ bridge::InterfaceTotals interface_totals(const FluidSolver &solver, std::span<co
   return total;
 }
 
-CentreLine::CentreLine(const Walls &walls) {
+CentreLine::CentreLine(const Walls<2> &walls) {
   const auto &outline = walls.coupled_vertices;
   const std::size_t n = outline.size();
   const auto at = [&](std::size_t k) { return walls.position[outline[k]]; };
@@ -78,33 +87,66 @@ CentreLine::CentreLine(const Walls &walls) {
     line_.push_back(0.5 * (at(k) + at(n - 1 - k)));
 }
 
-bool CentreLine::is_past(const Vec<2> &x) const {
-  if (x.y() < tip().y())
-    return x.x() > tip().x();
+bool CentreLine::is_past(double x, double y) const {
+  if (y < tip().y())
+    return x > tip().x();
   for (std::size_t k = 1; k < line_.size(); ++k) {
     const Vec<2> &a = line_[k - 1], &b = line_[k];
-    if (x.y() <= a.y() && x.y() >= b.y() && a.y() > b.y())
-      return x.x() > b.x() + (x.y() - b.y()) / (a.y() - b.y()) * (a.x() - b.x());
+    if (y <= a.y() && y >= b.y() && a.y() > b.y())
+      return x > b.x() + (y - b.y()) / (a.y() - b.y()) * (a.x() - b.x());
   }
-  return x.x() > line_.front().x();
+  return x > line_.front().x();
 }
 
-std::optional<double> floor_at(const Walls &walls, double x) {
+namespace {
+
+/// Height at which the vertical line meets a face with the fluid above it.
+std::optional<double> height_on(const Walls<2> &walls, const WallFace<2> &face,
+                                const Vec<1> &line) {
+  const auto [a, b] = walls.corners(face);
+  const double x = line[0];
+  if (!(a.x() <= x && x <= b.x() && a.x() < b.x())) // the fluid lies on the left: above
+    return {};
+  return a.y() + (x - a.x()) / (b.x() - a.x()) * (b.y() - a.y());
+}
+
+std::optional<double> height_on(const Walls<3> &walls, const WallFace<3> &face,
+                                const Vec<2> &line) {
+  const auto [a, b, c] = walls.corners(face);
+  const auto across = [](const Vec<3> &p, const Vec<3> &q, const Vec<2> &x) { // z before x: y is up
+    return (q.z() - p.z()) * (x[0] - p.x()) - (q.x() - p.x()) * (x[1] - p.z());
+  };
+  const double in_c = across(a, b, line), in_a = across(b, c, line), in_b = across(c, a, line);
+  const double sum = in_a + in_b + in_c;
+  if (!(in_a >= 0 && in_b >= 0 && in_c >= 0 && sum > 0))
+    return {};
+  return (in_a * a.y() + in_b * b.y() + in_c * c.y()) / sum;
+}
+
+template <int dim> bool is_near(const Vec<dim> &x, const VerticalLine<dim> &line, double distance) {
+  for (int d = 0; d < dim - 1; ++d)
+    if (std::abs(x[2 * d] - line[d]) > distance)
+      return false;
+  return true;
+}
+
+} // namespace
+
+template <int dim>
+std::optional<double> floor_at(const Walls<dim> &walls, const VerticalLine<dim> &line) {
   std::optional<double> floor;
-  for (const WallSegment &s : walls.segments) {
-    const Vec<2> &a = walls.position[s.a], &b = walls.position[s.b];
-    if (!(a.x() <= x && x <= b.x() && a.x() < b.x())) // the fluid lies on the left: above
-      continue;
-    const double y = a.y() + (x - a.x()) / (b.x() - a.x()) * (b.y() - a.y());
-    floor = std::min(floor.value_or(y), y);
-  }
+  for (const WallFace<dim> &face : walls.faces)
+    if (const auto y = height_on(walls, face, line))
+      floor = std::min(floor.value_or(*y), *y);
   return floor;
 }
 
-double water_level(const Points &points, double x, double spacing, std::optional<double> floor) {
+template <int dim>
+double water_level(const Points<dim> &points, const VerticalLine<dim> &line, double spacing,
+                   std::optional<double> floor) {
   std::vector<double> heights;
-  for (const Vec<2> &p : points.position)
-    if (std::abs(p.x() - x) <= spacing)
+  for (const Vec<dim> &p : points.position)
+    if (is_near<dim>(p, line, spacing))
       heights.push_back(p.y());
   std::sort(heights.begin(), heights.end());
   if (heights.empty() && !floor)
@@ -118,5 +160,18 @@ double water_level(const Points &points, double x, double spacing, std::optional
   }
   return level > bottom || !floor ? level + 0.5 * spacing : bottom;
 }
+
+template Integrals<2> integrate(const FluidState<2> &, const FluidParams<2> &);
+template Integrals<2> integrate(const FluidSolver<2> &);
+template bridge::InterfaceTotals interface_totals(const FluidSolver<2> &, VecView<2>, VecView<2>);
+template std::optional<double> floor_at(const Walls<2> &, const VerticalLine<2> &);
+template double water_level(const Points<2> &, const VerticalLine<2> &, double,
+                            std::optional<double>);
+template Integrals<3> integrate(const FluidState<3> &, const FluidParams<3> &);
+template Integrals<3> integrate(const FluidSolver<3> &);
+template bridge::InterfaceTotals interface_totals(const FluidSolver<3> &, VecView<3>, VecView<3>);
+template std::optional<double> floor_at(const Walls<3> &, const VerticalLine<3> &);
+template double water_level(const Points<3> &, const VerticalLine<3> &, double,
+                            std::optional<double>);
 
 } // namespace sluice::fluid

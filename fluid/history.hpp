@@ -14,30 +14,31 @@
 
 namespace sluice::fluid {
 
-class History {
+template <int dim> class History {
 public:
   /// Opens the files in `folder` and records the first state, whose time is `time` [s].
-  History(const Scene &scene, const FluidSolver &solver, std::filesystem::path folder,
+  History(const Scene<dim> &scene, const FluidSolver<dim> &solver, std::filesystem::path folder,
           double output_interval, double time = 0);
 
   /// Records the step that has just ended at `time` [s]; `loads` are those on the coupled walls.
-  void record(const FluidSolver &solver, const bridge::InterfaceTotals &loads, double time);
+  void record(const FluidSolver<dim> &solver, const bridge::InterfaceTotals &loads, double time);
   /// Writes fluid_summary.json, and of a complete run the state; `message` is empty for such a run.
-  void write_summary(const FluidSolver &solver, const std::string &message,
+  void write_summary(const FluidSolver<dim> &solver, const std::string &message,
                      const nlohmann::json &bridge_summary) const;
   /// Short text for the progress line.
   std::string note() const;
 
 private:
-  void record_loads(const FluidSolver &solver, const bridge::InterfaceTotals &loads, double time);
-  void write_fields(const FluidSolver &solver, double time);
-  void write_state_file(const FluidSolver &solver, double time) const;
-  Vec<2> force_on_all_walls(const FluidSolver &solver); // without contact [N/m]
-  double energy_gain(const Integrals &now) const; // since the start [J/m]
-  void update_extremes(const FluidSolver &solver, const Integrals &now);
+  void record_loads(const FluidSolver<dim> &solver, const bridge::InterfaceTotals &loads,
+                    double time);
+  void write_fields(const FluidSolver<dim> &solver, double time);
+  void write_state_file(const FluidSolver<dim> &solver, double time) const;
+  Vec<dim> force_on_all_walls(const FluidSolver<dim> &solver); // without contact [N]
+  double energy_gain(const Integrals<dim> &now) const;         // since the start [J]
+  void update_extremes(const FluidSolver<dim> &solver, const Integrals<dim> &now);
 
   std::filesystem::path folder_;
-  std::vector<GaugeParams> gauges_;
+  std::vector<GaugeParams<dim>> gauges_;
   CsvWriter series_, loads_;
   PointOutput points_;
   WallOutput walls_;
@@ -46,13 +47,13 @@ private:
 
   // running sums
   double work_on_walls_ = 0, outlet_energy_ = 0, start_outlet_energy_ = 0, last_time_ = 0;
-  Integrals start_, last_;
+  Integrals<dim> start_, last_;
   long guarded_rows_ = 0, steps_ = 0, pressure_iterations_ = 0, pressure_solves_ = 0;
-  double energy_scale_ = 0; // [J/m], kinetic and potential above the lowest point at the start
+  double energy_scale_ = 0; // [J], kinetic and potential above the lowest point at the start
   double volume_drift_max_ = 0, energy_gain_max_ = -1e300;
   double initial_volume_ = 0;
-  WallQuadrature all_walls_;
-  std::vector<Vec<2>> all_tractions_;
+  WallQuadrature<dim> all_walls_;
+  std::vector<Vec<dim>> all_tractions_;
 };
 
 } // namespace sluice::fluid

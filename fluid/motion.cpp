@@ -10,10 +10,10 @@
 
 namespace sluice::fluid {
 
-void move_points(Points &points, double dt, double previous_dt) {
+template <int dim> void move_points(Points<dim> &points, double dt, double previous_dt) {
   const double ahead = previous_dt > 0 ? 0.5 * dt / previous_dt : 0.5;
   for_each_point(points.size(), [&](int i) {
-    Vec<2> &u = points.velocity[i], &old = points.previous_velocity[i];
+    Vec<dim> &u = points.velocity[i], &old = points.previous_velocity[i];
     points.position[i] += dt * ((1 + ahead) * u - ahead * old) + points.shift[i];
     u += points.shift_velocity[i];
     old += points.shift_velocity[i];
@@ -25,7 +25,7 @@ void move_points(Points &points, double dt, double previous_dt) {
 namespace {
 
 // Two walls on opposite sides of a point leave each at most 0.45 of the gap as clearance.
-double clearance_between(const PointWalls &walls, double clearance) {
+template <int dim> double clearance_between(const PointWalls<dim> &walls, double clearance) {
   for (int k = 1; k < walls.count; ++k)
     if (walls.projection[0].normal.dot(walls.projection[k].normal) < -0.5)
       clearance = std::min(
@@ -39,15 +39,16 @@ struct Contact {
   bool moved = false;
 };
 
-Contact resolve_contact(Vec<2> &x, Vec<2> &u, const Walls &walls,
+template <int dim>
+Contact resolve_contact(Vec<dim> &x, Vec<dim> &u, const Walls<dim> &walls,
                         std::span<const int> candidates, double reach, double clearance) {
   Contact contact;
   constexpr int sweeps = 4;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
-    const PointWalls near = project_on_walls(walls, candidates, x, reach);
+    const PointWalls<dim> near = project_on_walls(walls, candidates, x, reach);
     const double limit = clearance_between(near, clearance);
     bool touched = false;
-    for (const Projection &p : near) {
+    for (const Projection<dim> &p : near) {
       if (p.distance >= limit * (1 - 1e-9))
         continue;
       contact.was_behind = contact.was_behind || (sweep == 0 && p.distance < 0);
@@ -64,62 +65,68 @@ Contact resolve_contact(Vec<2> &x, Vec<2> &u, const Walls &walls,
 
 } // namespace
 
-ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
-                                  const Cloud &cloud) {
+template <int dim>
+ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &walls,
+                                       const MotionParams &params, const Cloud<dim> &cloud) {
   const double clearance = params.wall_clearance * cloud.spacing;
   const int n = static_cast<int>(cloud.wall_points.size());
-  const auto sums = block_sums<4>(n, [&](IndexRange range) {
-    std::array<double, 4> part{};
-    for (int k = range.begin; k < range.end; ++k) {
-      const PointWalls &near = cloud.point_walls[k];
-      if (near.count == 0 || near.projection[0].distance >= clearance * (1 - 1e-9))
-        continue;
-      const int i = cloud.wall_points[k];
-      const auto candidates = cloud.near_segments.near(cloud.grid.cell(points.position[i]));
-      const Vec<2> before = points.velocity[i];
-      const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
-                                              candidates, cloud.radius, clearance);
-      const Vec<2> change = points.velocity[i] - before;
-      part[0] += contact.moved;
-      part[1] += contact.was_behind;
-      part[2] += change.x();
-      part[3] += change.y();
-    }
-    return part;
-  }, Work::heavy);
-  return {static_cast<int>(sums[0]), static_cast<int>(sums[1]), {sums[2], sums[3]}};
+  const auto sums = block_sums<2 + dim>(
+      n,
+      [&](IndexRange range) {
+        std::array<double, 2 + dim> part{};
+        for (int k = range.begin; k < range.end; ++k) {
+          const PointWalls<dim> &near = cloud.point_walls[k];
+          if (near.count == 0 || near.projection[0].distance >= clearance * (1 - 1e-9))
+            continue;
+          const int i = cloud.wall_points[k];
+          const auto candidates = cloud.near_faces.near(cloud.grid.cell(points.position[i]));
+          const Vec<dim> before = points.velocity[i];
+          const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
+                                                  candidates, cloud.radius, clearance);
+          const Vec<dim> change = points.velocity[i] - before;
+          part[0] += contact.moved;
+          part[1] += contact.was_behind;
+          for (int d = 0; d < dim; ++d)
+            part[2 + d] += change[d];
+        }
+        return part;
+      },
+      Work::heavy);
+  return {static_cast<int>(sums[0]), static_cast<int>(sums[1]), Vec<dim>(&sums[2])};
 }
 
-void volume_restoring_divergence(const Points &points, const Cloud &cloud,
+template <int dim>
+void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cloud,
                                  const MotionParams &params, double gravity,
                                  std::span<double> divergence) {
-  const double volume = cloud.spacing * cloud.spacing;
+  const double volume = volume_of_point<dim>(cloud.spacing);
   const double rate = params.volume_rate * std::sqrt(gravity / cloud.spacing);
   constexpr double largest_error = 0.3;
   for_each_point(points.size(), [&](int i) {
     divergence[i] = 0;
     if (cloud.kind[i] != PointKind::interior)
       return;
-    double area = cloud.cell_area[i], total = 1;
+    double filled = cloud.cell_volume[i], total = 1;
     for (const int j : cloud.neighbours.of(i)) {
       if (cloud.kind[j] != PointKind::interior)
         continue;
       const double q = (points.position[j] - points.position[i]).norm() / cloud.radius;
       const double w = weight(std::min(q, 1.0));
-      area += w * cloud.cell_area[j];
+      filled += w * cloud.cell_volume[j];
       total += w;
     }
-    const double error = 1 - area / (total * volume);
+    const double error = 1 - filled / (total * volume);
     divergence[i] = rate * std::clamp(error, -largest_error, largest_error);
   });
 }
 
 namespace {
 
-Vec<2> push_apart(int i, const Points &points, const Cloud &cloud, double closest) {
-  Vec<2> push = Vec<2>::Zero();
+template <int dim>
+Vec<dim> push_apart(int i, const Points<dim> &points, const Cloud<dim> &cloud, double closest) {
+  Vec<dim> push = Vec<dim>::Zero();
   for (const int j : cloud.neighbours.of(i)) {
-    const Vec<2> r = points.position[i] - points.position[j];
+    const Vec<dim> r = points.position[i] - points.position[j];
     const double distance = r.norm();
     if (distance < closest && distance > 1e-12)
       push += 0.5 * (closest / distance - 1) * r;
@@ -127,29 +134,37 @@ Vec<2> push_apart(int i, const Points &points, const Cloud &cloud, double closes
   return push;
 }
 
-// Two numbers in [-1, 1] that depend on the point alone (SplitMix64 by S. Vigna).
-Vec<2> own_direction(std::int32_t id) {
-  std::uint64_t z = (static_cast<std::uint64_t>(id) + 1) * 0x9e3779b97f4a7c15u;
-  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
-  z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
-  z ^= z >> 31;
-  const double scale = 1.0 / 2147483648.0;
-  return {static_cast<double>(z & 0xffffffffu) * scale - 1, static_cast<double>(z >> 32) * scale - 1};
+// Numbers in [-1, 1] that depend on the point alone (SplitMix64 by S. Vigna), two from each draw.
+template <int dim> Vec<dim> own_direction(std::int32_t id) {
+  std::uint64_t state = static_cast<std::uint64_t>(id) * ((dim + 1) / 2);
+  constexpr double scale = 1.0 / 2147483648.0;
+  Vec<dim> direction;
+  for (int d = 0; d < dim; d += 2) {
+    std::uint64_t z = ++state * 0x9e3779b97f4a7c15u;
+    z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9u;
+    z = (z ^ (z >> 27)) * 0x94d049bb133111ebu;
+    z ^= z >> 31;
+    direction[d] = static_cast<double>(z & 0xffffffffu) * scale - 1;
+    if (d + 1 < dim)
+      direction[d + 1] = static_cast<double>(z >> 32) * scale - 1;
+  }
+  return direction;
 }
 
 } // namespace
 
-void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
-                std::span<const Mat<2>> velocity_gradient, double dt) {
+template <int dim>
+void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams &params,
+                MatView<dim> velocity_gradient, double dt) {
   const double closest = params.closest_pair * cloud.spacing;
   const double longest = 0.1 * cloud.spacing;
   for_each_point(points.size(), [&](int i) {
-    const Mat<2> &g = velocity_gradient[i];
+    const Mat<dim> &g = velocity_gradient[i];
     const double strain_rate = (g + g.transpose()).norm() / std::sqrt(2.0);
     const double strain = std::min(strain_rate * dt, 0.25);
-    Vec<2> shift = strain * (params.regularity * cloud.centroid_offset[i] +
-                             params.agitation * cloud.spacing * own_direction(points.id[i]));
-    const Vec<2> &n = cloud.surface_normal[i];
+    Vec<dim> shift = strain * (params.regularity * cloud.centroid_offset[i] +
+                               params.agitation * cloud.spacing * own_direction<dim>(points.id[i]));
+    const Vec<dim> &n = cloud.surface_normal[i];
     shift -= n.dot(shift) * n;
     if (cloud.kind[i] == PointKind::thin)
       shift.setZero();
@@ -159,8 +174,21 @@ void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
       shift *= longest / length;
     points.shift[i] = shift;
     points.shift_velocity[i] =
-        cloud.kind[i] == PointKind::interior ? Vec<2>(g * shift) : Vec<2>(Vec<2>::Zero());
+        cloud.kind[i] == PointKind::interior ? Vec<dim>(g * shift) : Vec<dim>(Vec<dim>::Zero());
   });
 }
+
+template void move_points(Points<2> &, double, double);
+template ContactCounts<2> keep_clear_of_walls(Points<2> &, const Walls<2> &, const MotionParams &,
+                                              const Cloud<2> &);
+template void volume_restoring_divergence(const Points<2> &, const Cloud<2> &, const MotionParams &,
+                                          double, std::span<double>);
+template void plan_shift(Points<2> &, const Cloud<2> &, const MotionParams &, MatView<2>, double);
+template void move_points(Points<3> &, double, double);
+template ContactCounts<3> keep_clear_of_walls(Points<3> &, const Walls<3> &, const MotionParams &,
+                                              const Cloud<3> &);
+template void volume_restoring_divergence(const Points<3> &, const Cloud<3> &, const MotionParams &,
+                                          double, std::span<double>);
+template void plan_shift(Points<3> &, const Cloud<3> &, const MotionParams &, MatView<3>, double);
 
 } // namespace sluice::fluid

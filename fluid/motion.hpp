@@ -26,35 +26,38 @@ struct MotionParams {
   double wall_clearance = 0.25;
 };
 
-struct ContactCounts {
-  int moved = 0;    // points that were too close to a wall
-  int put_back = 0; // of these, points that were behind it
-  Vec<2> velocity_change{0, 0}; // sum over the points [m/s]
+template <int dim> struct ContactCounts {
+  int moved = 0;                               // points that were too close to a wall
+  int put_back = 0;                            // of these, points that were behind it
+  Vec<dim> velocity_change = Vec<dim>::Zero(); // sum over the points [m/s]
 };
 
 /// Advances the points by a step `dt` [s] with the second-order extrapolation of their velocity,
 /// x += dt ((1 + r/2) u^n - r/2 u^{n-1}), r = dt / previous_dt, which from stage to stage is the
 /// trapezoidal rule; then applies the pending regularisation. `previous_dt` [s] is the step that
 /// ended in u^n, 0 before the first. (The cloud lives at the stage positions; derived here.)
-void move_points(Points &points, double dt, double previous_dt);
+template <int dim> void move_points(Points<dim> &points, double dt, double previous_dt);
 
 /// Puts points that are behind a wall or too close to it back to the clearance and removes their
 /// velocity towards it; two walls on opposite sides leave each at most 0.45 of the gap as
 /// clearance. Needs the cloud's projections.
-ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const MotionParams &params,
-                                  const Cloud &cloud);
+template <int dim>
+ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &walls,
+                                       const MotionParams &params, const Cloud<dim> &cloud);
 
 /// Divergence that brings the cells back to their volume [1/s], zero at the free surface: the
 /// relative volume error, averaged over the neighbours, times volume_rate sqrt(g / spacing).
-void volume_restoring_divergence(const Points &points, const Cloud &cloud,
+template <int dim>
+void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cloud,
                                  const MotionParams &params, double gravity,
                                  std::span<double> divergence);
 
 /// Regularisation to be applied in the next move: towards the cell's centroid at a rate
 /// proportional to the local strain rate (along the surface only, at the free surface), and apart
-/// from a neighbour that is too close; plus an agitation proportional to the strain. Zero in a fluid
-/// at rest whose points keep their distance.
-void plan_shift(Points &points, const Cloud &cloud, const MotionParams &params,
-                std::span<const Mat<2>> velocity_gradient, double dt);
+/// from a neighbour that is too close; plus an agitation proportional to the strain. Zero in a
+/// fluid at rest whose points keep their distance.
+template <int dim>
+void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams &params,
+                MatView<dim> velocity_gradient, double dt);
 
 } // namespace sluice::fluid

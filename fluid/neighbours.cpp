@@ -2,6 +2,7 @@
 #include "fluid/neighbours.hpp"
 
 #include "bridge/base/check.hpp"
+#include "fluid/coordinates.hpp"
 #include "fluid/parallel.hpp"
 
 #include <algorithm>
@@ -9,32 +10,50 @@
 
 namespace sluice::fluid {
 
-int Grid::column(double x) const {
-  return static_cast<int>(std::clamp((x - origin.x()) / cell_size, 0.0, nx - 1.0));
-}
-int Grid::row(double y) const {
-  return static_cast<int>(std::clamp((y - origin.y()) / cell_size, 0.0, ny - 1.0));
+template <int dim> int Grid<dim>::n_cells() const {
+  int n = 1;
+  for (const int along : size)
+    n *= along;
+  return n;
 }
 
-Grid grid_over(const Points &points, double cell_size) {
-  Vec<2> low = Vec<2>::Constant(1e300), high = -low;
+template <int dim> Vec<dim> Grid<dim>::top() const {
+  Vec<dim> cells;
+  for (int d = 0; d < dim; ++d)
+    cells[d] = size[d];
+  return origin + cell_size * cells;
+}
+
+template <int dim> int Grid<dim>::number(double coordinate, int d) const {
+  return static_cast<int>(std::clamp((coordinate - origin[d]) / cell_size, 0.0, size[d] - 1.0));
+}
+
+template <int dim> typename Grid<dim>::Place Grid<dim>::place(const Vec<dim> &x) const {
+  Place at;
+  for (int d = 0; d < dim; ++d)
+    at[d] = number(x[d], d);
+  return at;
+}
+
+template <int dim> Grid<dim> grid_over(const Points<dim> &points, double cell_size) {
+  Vec<dim> low = Vec<dim>::Constant(1e300), high = -low;
   for (int i = 0; i < points.size(); ++i) {
-    const Vec<2> &x = points.position[i];
-    check(x.allFinite(), "point {} has no finite position: ({}, {}) m; reduce the time step",
-          points.id[i], x.x(), x.y());
+    const Vec<dim> &x = points.position[i];
+    check(x.allFinite(), "point {} has no finite position: {} m; reduce the time step",
+          points.id[i], text_of(x));
     low = low.cwiseMin(x);
     high = high.cwiseMax(x);
   }
   if (points.size() == 0)
-    low = high = Vec<2>::Zero();
-  Grid grid{low, cell_size, 0, 0};
-  const Vec<2> cells = (high - low) / cell_size;
-  check(cells.x() * cells.y() < 2e7,
-        "the points spread over {:.3g} x {:.3g} m, too far for cells of {:.3g} m; "
+    low = high = Vec<dim>::Zero();
+  Grid<dim> grid{low, cell_size, {}};
+  const Vec<dim> cells = (high - low) / cell_size;
+  check(cells.prod() < 2e7,
+        "the points spread over {} m, too far for cells of {:.3g} m; "
         "add an outlet or reduce the time step",
-        high.x() - low.x(), high.y() - low.y(), cell_size);
-  grid.nx = static_cast<int>(cells.x()) + 1;
-  grid.ny = static_cast<int>(cells.y()) + 1;
+        text_of_size<dim>(high - low), cell_size);
+  for (int d = 0; d < dim; ++d)
+    grid.size[d] = static_cast<int>(cells[d]) + 1;
   return grid;
 }
 
@@ -48,7 +67,8 @@ template <class T> void reorder(std::vector<T> &values, const std::vector<int> &
 
 } // namespace
 
-void sort_by_cell(Points &points, const Grid &grid, CellRanges &ranges) {
+template <int dim>
+void sort_by_cell(Points<dim> &points, const Grid<dim> &grid, CellRanges &ranges) {
   const int n = points.size();
   std::vector<int> cell(n), order(n);
   ranges.start.assign(grid.n_cells() + 1, 0);
@@ -72,33 +92,35 @@ void sort_by_cell(Points &points, const Grid &grid, CellRanges &ranges) {
 
 namespace {
 
-// Calls visit(j) for every point j in the 3 x 3 cells around x_i: three ranges, since the cells of
+// Calls visit(j) for every point j in the 3^dim cells around x_i: a few ranges, since the cells of
 // a row are contiguous.
-template <class Visit>
-void for_each_near(const Vec<2> &x, const Grid &grid, const CellRanges &ranges, Visit &&visit) {
-  const int cx = grid.column(x.x()), cy = grid.row(x.y());
-  const int x0 = std::max(cx - 1, 0), x1 = std::min(cx + 1, grid.nx - 1);
-  for (int y = std::max(cy - 1, 0); y <= std::min(cy + 1, grid.ny - 1); ++y)
-    for (int j = ranges.start[y * grid.nx + x0]; j < ranges.start[y * grid.nx + x1 + 1]; ++j)
+template <int dim, class Visit>
+void for_each_near(const Vec<dim> &x, const Grid<dim> &grid, const CellRanges &ranges,
+                   Visit &&visit) {
+  auto low = grid.place(x), high = low;
+  for (int d = 0; d < dim; ++d) {
+    low[d] = std::max(low[d] - 1, 0);
+    high[d] = std::min(high[d] + 1, grid.size[d] - 1);
+  }
+  grid.for_each_run(low, high, [&](int first, int last) {
+    for (int j = ranges.start[first]; j < ranges.start[last + 1]; ++j)
       visit(j);
+  });
 }
 
-} // namespace
-
-namespace {
-
 // Fills all lists; returns the length that the longest would have.
-int fill_lists(const Points &points, const Grid &grid, const CellRanges &ranges, double radius,
-               NeighbourLists &lists) {
+template <int dim>
+int fill_lists(const Points<dim> &points, const Grid<dim> &grid, const CellRanges &ranges,
+               double radius, NeighbourLists &lists) {
   const int n = points.size();
   const double radius2 = radius * radius;
   lists.count.resize(n);
   lists.index.resize(static_cast<std::size_t>(n) * lists.capacity);
   for_each_point(n, [&](int i) {
-    const Vec<2> x = points.position[i];
+    const Vec<dim> x = points.position[i];
     int *const list = lists.first(i);
     int count = 0;
-    for_each_near(x, grid, ranges, [&](int j) {
+    for_each_near<dim>(x, grid, ranges, [&](int j) {
       const bool is_near = (points.position[j] - x).squaredNorm() < radius2 && j != i;
       list[std::min(count, lists.capacity - 1)] = j;
       count += is_near;
@@ -110,11 +132,14 @@ int fill_lists(const Points &points, const Grid &grid, const CellRanges &ranges,
 
 } // namespace
 
-void find_neighbours(const Points &points, const Grid &grid, const CellRanges &ranges,
+template <int dim>
+void find_neighbours(const Points<dim> &points, const Grid<dim> &grid, const CellRanges &ranges,
                      double radius, NeighbourLists &lists) {
+  if (dim == 3)
+    lists.capacity = std::max(lists.capacity, 104);
   int longest = fill_lists(points, grid, ranges, radius, lists);
-  if (longest >= lists.capacity && lists.capacity < most_neighbours) {
-    lists.capacity = most_neighbours;
+  if (longest >= lists.capacity && lists.capacity < most_neighbours<dim>) {
+    lists.capacity = most_neighbours<dim>;
     longest = fill_lists(points, grid, ranges, radius, lists);
   }
   if (longest >= lists.capacity)
@@ -137,5 +162,16 @@ void lay_out_rows(const NeighbourLists &lists, SparseMatrix &matrix) {
     std::copy(neighbours.begin(), neighbours.end(), column + 1);
   });
 }
+
+template struct Grid<2>;
+template struct Grid<3>;
+template Grid<2> grid_over(const Points<2> &, double);
+template Grid<3> grid_over(const Points<3> &, double);
+template void sort_by_cell(Points<2> &, const Grid<2> &, CellRanges &);
+template void sort_by_cell(Points<3> &, const Grid<3> &, CellRanges &);
+template void find_neighbours(const Points<2> &, const Grid<2> &, const CellRanges &, double,
+                              NeighbourLists &);
+template void find_neighbours(const Points<3> &, const Grid<3> &, const CellRanges &, double,
+                              NeighbourLists &);
 
 } // namespace sluice::fluid

@@ -43,12 +43,15 @@ void write_file(const std::filesystem::path &file, vtkPolyData *data) {
   check(writer->Write() == 1, "{}: cannot be written; is the disk full?", file.string());
 }
 
-vtkNew<vtkPoints> to_vtk_points(const std::vector<Vec<2>> &positions) {
+Vec<3> in_space(const Vec<2> &x) { return {x.x(), x.y(), 0}; }
+const Vec<3> &in_space(const Vec<3> &x) { return x; }
+
+template <int dim> vtkNew<vtkPoints> to_vtk_points(const std::vector<Vec<dim>> &positions) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
   points->SetNumberOfPoints(static_cast<vtkIdType>(positions.size()));
   for (std::size_t i = 0; i < positions.size(); ++i)
-    points->SetPoint(static_cast<vtkIdType>(i), positions[i].x(), positions[i].y(), 0);
+    points->SetPoint(static_cast<vtkIdType>(i), in_space(positions[i]).data());
   return points;
 }
 
@@ -62,14 +65,15 @@ void add_array(vtkDataSetAttributes *data, const char *name, std::size_t n, Valu
   data->AddArray(array);
 }
 
+template <int dim>
 void add_vectors(vtkDataSetAttributes *data, const char *name,
-                 const std::vector<Vec<2>> &vectors) {
+                 const std::vector<Vec<dim>> &vectors) {
   vtkNew<vtkFloatArray> array;
   array->SetName(name);
   array->SetNumberOfComponents(3);
   array->SetNumberOfTuples(static_cast<vtkIdType>(vectors.size()));
   for (std::size_t i = 0; i < vectors.size(); ++i)
-    array->SetTuple3(static_cast<vtkIdType>(i), vectors[i].x(), vectors[i].y(), 0);
+    array->SetTuple(static_cast<vtkIdType>(i), in_space(vectors[i]).data());
   data->AddArray(array);
 }
 
@@ -84,7 +88,9 @@ vtkNew<vtkCellArray> one_vertex_per_point(std::size_t n) {
 
 } // namespace
 
-void PointOutput::write(const Points &points, const Cloud &cloud, std::int64_t step, double time) {
+template <int dim>
+void PointOutput::write(const Points<dim> &points, const Cloud<dim> &cloud, std::int64_t step,
+                        double time) {
   vtkNew<vtkPolyData> data;
   const std::size_t n = points.position.size();
   const bool is_frozen = cloud.kind.size() == n; // not before the first step
@@ -92,33 +98,43 @@ void PointOutput::write(const Points &points, const Cloud &cloud, std::int64_t s
   data->SetVerts(one_vertex_per_point(n));
   add_array<vtkFloatArray>(data->GetPointData(), "pressure", n,
                            [&](std::size_t i) { return points.pressure[i]; });
-  add_array<vtkUnsignedCharArray>(data->GetPointData(), "kind", n,
-                                  [&](std::size_t i) { return is_frozen ? static_cast<int>(cloud.kind[i]) : 0; });
+  add_array<vtkUnsignedCharArray>(data->GetPointData(), "kind", n, [&](std::size_t i) {
+    return is_frozen ? static_cast<int>(cloud.kind[i]) : 0;
+  });
   add_array<vtkIntArray>(data->GetPointData(), "id", n,
                          [&](std::size_t i) { return points.id[i]; });
   add_array<vtkFloatArray>(data->GetPointData(), "volume", n,
-                           [&](std::size_t i) { return is_frozen ? cloud.cell_area[i] : 0.0; });
+                           [&](std::size_t i) { return is_frozen ? cloud.cell_volume[i] : 0.0; });
   add_vectors(data->GetPointData(), "velocity", points.velocity);
   const auto file = next_file(step);
   write_file(file, data);
   written(file, time);
 }
 
-void WallOutput::write(const Walls &walls, std::int64_t step, double time) {
+template <int dim> void WallOutput::write(const Walls<dim> &walls, std::int64_t step, double time) {
   vtkNew<vtkPolyData> data;
   data->SetPoints(to_vtk_points(walls.position));
-  vtkNew<vtkCellArray> lines;
-  for (const WallSegment &s : walls.segments) {
-    const vtkIdType ends[2] = {s.a, s.b};
-    lines->InsertNextCell(2, ends);
+  vtkNew<vtkCellArray> cells;
+  for (const WallFace<dim> &face : walls.faces) {
+    std::array<vtkIdType, dim> corners;
+    std::copy(face.vertex.begin(), face.vertex.end(), corners.begin());
+    cells->InsertNextCell(dim, corners.data());
   }
-  data->SetLines(lines);
+  if constexpr (dim == 2)
+    data->SetLines(cells);
+  else
+    data->SetPolys(cells);
   add_vectors(data->GetPointData(), "velocity", walls.velocity);
-  add_array<vtkIntArray>(data->GetCellData(), "wall", walls.segments.size(),
-                         [&](std::size_t k) { return walls.segments[k].wall; });
+  add_array<vtkIntArray>(data->GetCellData(), "wall", walls.faces.size(),
+                         [&](std::size_t k) { return walls.faces[k].wall; });
   const auto file = next_file(step);
   write_file(file, data);
   written(file, time);
 }
+
+template void PointOutput::write(const Points<2> &, const Cloud<2> &, std::int64_t, double);
+template void WallOutput::write(const Walls<2> &, std::int64_t, double);
+template void PointOutput::write(const Points<3> &, const Cloud<3> &, std::int64_t, double);
+template void WallOutput::write(const Walls<3> &, std::int64_t, double);
 
 } // namespace sluice::fluid

@@ -27,18 +27,20 @@ private:
   std::vector<std::pair<double, std::string>> entries_;
 };
 
-/// fluid_*.vtp: points with pressure [Pa], velocity [m/s], kind (0 interior, 1 surface, 2 thin), id.
+/// fluid_*.vtp: points with pressure [Pa], velocity [m/s], kind (0 interior, 1 surface, 2 thin),
+/// id.
 class PointOutput : VtkSeries {
 public:
   explicit PointOutput(const std::filesystem::path &folder) : VtkSeries(folder, "fluid") {}
-  void write(const Points &points, const Cloud &cloud, std::int64_t step, double time);
+  template <int dim>
+  void write(const Points<dim> &points, const Cloud<dim> &cloud, std::int64_t step, double time);
 };
 
-/// wall_*.vtp: segments with velocity [m/s] and the number of their wall.
+/// wall_*.vtp: segments or triangles with velocity [m/s] and the number of their wall.
 class WallOutput : VtkSeries {
 public:
   explicit WallOutput(const std::filesystem::path &folder) : VtkSeries(folder, "wall") {}
-  void write(const Walls &walls, std::int64_t step, double time);
+  template <int dim> void write(const Walls<dim> &walls, std::int64_t step, double time);
 };
 
 } // namespace sluice::fluid

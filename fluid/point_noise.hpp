@@ -7,7 +7,8 @@
 //
 // is zero for every quadratic field and of third order for smooth ones, but full for alternating
 // ones. Antisymmetric in i and j with symmetric weights: linear momentum is kept (up to neighbours
-// that a crowded list leaves out). Derived here; the idea is that of Rhie and Chow, AIAA J. 21 (1983) 1525. A rate: independent of the step.
+// that a crowded list leaves out). Derived here; the idea is that of Rhie and Chow, AIAA J. 21
+// (1983) 1525. A rate: independent of the step.
 #pragma once
 
 #include "fluid/cloud.hpp"
@@ -18,8 +19,8 @@ namespace sluice::fluid {
 
 /// Adds the damping over `dt` [s] to `velocity` [m/s], computed from `reference` and its gradient
 /// [1/s]; `rate` [1/s]. Points of kind `thin` take no part: spray flies freely.
-void damp_point_noise(const Points &points, const Cloud &cloud, std::span<const Vec<2>> reference,
-                      std::span<const Mat<2>> gradient, double rate, double dt,
-                      std::span<Vec<2>> velocity);
+template <int dim>
+void damp_point_noise(const Points<dim> &points, const Cloud<dim> &cloud, VecView<dim> reference,
+                      MatView<dim> gradient, double rate, double dt, VecSpan<dim> velocity);
 
 } // namespace sluice::fluid

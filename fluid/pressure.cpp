@@ -13,36 +13,40 @@ namespace {
 
 // Weight of a wall row: that of a neighbour at no distance.
 constexpr double wall_weight = 1.0;
-// Points farther from a wall than this, in spacings, have no row for it: they see enough neighbours.
+// Points farther from a wall than this, in spacings, have no row for it: they see enough
+// neighbours.
 constexpr double wall_row_reach = 1.5;
 
 /// A neighbour in scaled coordinates.
-struct Neighbour {
+template <int dim> struct Neighbour {
   int j;
-  Vec<2> q; // r / h
+  Vec<dim> q; // r / h
   double w;
 };
 
 /// All that the row of one point is made from, gathered once.
-struct Stencil {
+template <int dim> struct Stencil {
   int i;
-  double h;                // kernel radius [m]
-  const PointWalls *walls; // or nullptr
-  bool open;               // touches air: no wall holds it, its pressure is not solved for
-  Vec<2> open_side;        // q of the zero of pressure half a spacing outside; 0: at the point
+  double h;                     // kernel radius [m]
+  const PointWalls<dim> *walls; // or nullptr
+  bool open;                    // touches air: no wall holds it, its pressure is not solved for
+  Vec<dim> open_side;           // q of the zero of pressure half a spacing outside; 0: at the point
   int count;
-  std::array<Neighbour, most_neighbours> neighbour;
+  std::array<Neighbour<dim>, most_neighbours<dim>> neighbour;
 };
 
-double reach_of_rows(const Cloud &cloud) { return wall_row_reach * cloud.spacing; }
+template <int dim> double reach_of_rows(const Cloud<dim> &cloud) {
+  return wall_row_reach * cloud.spacing;
+}
 
 // A sharp edge has no row: held at the direction towards it, a point would have to circle round the
 // edge, and the suction of that circle tears the flow off. Contact alone keeps points out.
-bool has_row(const Projection &p, const Cloud &cloud) {
+template <int dim> bool has_row(const Projection<dim> &p, const Cloud<dim> &cloud) {
   return p.distance < reach_of_rows(cloud) && !p.at_edge;
 }
 
-template <class Visit> void for_each_wall_row(const Stencil &s, const Cloud &cloud, Visit &&visit) {
+template <int dim, class Visit>
+void for_each_wall_row(const Stencil<dim> &s, const Cloud<dim> &cloud, Visit &&visit) {
   if (!s.walls)
     return;
   for (int m = 0; m < s.walls->count; ++m)
@@ -50,74 +54,79 @@ template <class Visit> void for_each_wall_row(const Stencil &s, const Cloud &clo
       visit(m, s.walls->projection[m]);
 }
 
-void gather(int i, const Points &points, const Cloud &cloud, Stencil &s) {
+template <int dim>
+void gather(int i, const Points<dim> &points, const Cloud<dim> &cloud, Stencil<dim> &s) {
   s.i = i;
   s.h = cloud.radius;
   s.walls = cloud.walls_of(i);
   s.open = cloud.kind[i] != PointKind::interior;
   s.open_side = 0.5 * cloud.spacing / cloud.radius * cloud.surface_normal[i];
   s.count = 0;
-  const Vec<2> x = points.position[i];
+  const Vec<dim> x = points.position[i];
   const double scale = 1 / s.h;
   for (const int j : cloud.neighbours.of(i)) {
-    const Vec<2> q = scale * (points.position[j] - x);
+    const Vec<dim> q = scale * (points.position[j] - x);
     s.neighbour[s.count++] = {j, q, weight(std::min(q.norm(), 1.0))};
   }
 }
 
-template <class Visit> void for_each_neighbour(const Stencil &s, Visit &&visit) {
+template <int dim, class Visit> void for_each_neighbour(const Stencil<dim> &s, Visit &&visit) {
   for (int k = 0; k < s.count; ++k)
     visit(s.neighbour[k]);
 }
 
 // --- fits -----------------------------------------------------------------------------------
 
-QuadraticFit quadratic_fit(const Stencil &s, const Points &points, const Cloud &cloud) {
-  QuadraticFit fit;
-  for_each_neighbour(s, [&](const Neighbour &n) { fit.add_neighbour(n.q, n.w); });
-  for_each_wall_row(s, cloud, [&](int, const Projection &p) {
-    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+template <int dim>
+QuadraticFit<dim> quadratic_fit(const Stencil<dim> &s, const Points<dim> &points,
+                                const Cloud<dim> &cloud) {
+  QuadraticFit<dim> fit;
+  for_each_neighbour(s, [&](const Neighbour<dim> &n) { fit.add_neighbour(n.q, n.w); });
+  for_each_wall_row(s, cloud, [&](int, const Projection<dim> &p) {
+    const Vec<dim> q = (p.point - points.position[s.i]) / s.h;
     fit.add_row(normal_derivative(q, p.normal), wall_weight);
   });
   return fit;
 }
 
-/// Functionals of d/dx, d/dy from the linear fit: with the walls' rows inside, with the zero of
-/// pressure outside at open points. Walls hold no open point: contact does.
-Eigen::Matrix<double, 5, 2> linear_gradient(const Stencil &s, const Cloud &cloud) {
-  LinearFit fit;
-  for_each_neighbour(s, [&](const Neighbour &n) { fit.add(n.q, n.w); });
+/// Functionals of the derivatives from the linear fit: with the walls' rows inside, with the zero
+/// of pressure outside at open points. Walls hold no open point: contact does.
+template <int dim>
+Functionals<dim> linear_gradient(const Stencil<dim> &s, const Cloud<dim> &cloud) {
+  LinearFit<dim> fit;
+  for_each_neighbour(s, [&](const Neighbour<dim> &n) { fit.add(n.q, n.w); });
   if (s.open)
     fit.add(s.open_side, weight(s.open_side.norm()));
   else
     for_each_wall_row(s, cloud,
-                      [&](int, const Projection &p) { fit.add(p.normal, wall_weight); });
-  Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
-  functional.topRows<2>() = (s.open ? fit.limited_inverse() : fit.inverse()) / s.h;
+                      [&](int, const Projection<dim> &p) { fit.add(p.normal, wall_weight); });
+  Functionals<dim> functional = Functionals<dim>::Zero();
+  functional.template topRows<dim>() = (s.open ? fit.limited_inverse() : fit.inverse()) / s.h;
   return functional;
 }
 
-/// Functionals of d/dx, d/dy for fields known in the fluid only (velocity): no wall rows.
-Mat<2> fluid_gradient(const Stencil &s) {
-  LinearFit fit;
-  for_each_neighbour(s, [&](const Neighbour &n) { fit.add(n.q, n.w); });
+/// Functionals of the derivatives for fields known in the fluid only (velocity): no wall rows.
+template <int dim> Mat<dim> fluid_gradient(const Stencil<dim> &s) {
+  LinearFit<dim> fit;
+  for_each_neighbour(s, [&](const Neighbour<dim> &n) { fit.add(n.q, n.w); });
   return (s.open ? fit.limited_inverse() : fit.inverse()) / s.h;
 }
 
 // --- velocity -------------------------------------------------------------------------------
 
 /// Gradient of u* at the point [1/s], g(a, b) = d u_a / d x_b.
-Mat<2> velocity_gradient(const Stencil &s, std::span<const Vec<2>> velocity,
-                         const Eigen::Matrix<double, 5, 2> &functional) {
-  Mat<2> g = Mat<2>::Zero();
-  const Vec<2> u = velocity[s.i];
-  const bool is_linear = functional(2, 0) == 0 && functional(3, 0) == 0 && functional(4, 0) == 0;
-  for_each_neighbour(s, [&](const Neighbour &n) {
-    Vec<2> coefficient = functional.topRows<2>().transpose() * n.q;
+template <int dim>
+Mat<dim> velocity_gradient(const Stencil<dim> &s, VecView<dim> velocity,
+                           const Functionals<dim> &functional) {
+  Mat<dim> g = Mat<dim>::Zero();
+  const Vec<dim> u = velocity[s.i];
+  constexpr int n = n_products<dim>;
+  const bool is_linear = (functional.template bottomRows<n>().col(0).array() == 0).all();
+  for_each_neighbour(s, [&](const Neighbour<dim> &m) {
+    Vec<dim> coefficient = functional.template topRows<dim>().transpose() * m.q;
     if (!is_linear)
-      coefficient += functional.bottomRows<3>().transpose() *
-                     Vec<3>(n.q.x() * n.q.x(), n.q.x() * n.q.y(), n.q.y() * n.q.y());
-    g += (n.w * (velocity[n.j] - u)) * coefficient.transpose();
+      coefficient += functional.template bottomRows<n>().transpose() * products(m.q);
+    g += (m.w * (velocity[m.j] - u)) * coefficient.transpose();
   });
   return g;
 }
@@ -125,26 +134,27 @@ Mat<2> velocity_gradient(const Stencil &s, std::span<const Vec<2>> velocity,
 // --- Laplacian rows -------------------------------------------------------------------------
 
 /// One row under construction: neighbour weights in list order, wall weights by projection.
-struct Row {
-  std::span<double> neighbour;   // of f_j - f_i
-  std::array<double, 3> wall{};  // of g [m]
+template <int dim> struct Row {
+  std::span<double> neighbour;                      // of f_j - f_i
+  std::array<double, most_projections<dim>> wall{}; // of g [m]
 };
 
-bool has_wrong_signs(const Row &row, double guard) {
+template <int dim> bool has_wrong_signs(const Row<dim> &row, double guard) {
   double negative = 0, positive = 0;
   for (const double a : row.neighbour)
     (a < 0 ? negative : positive) += std::abs(a);
   return negative > guard * positive || !(positive > 0);
 }
 
-void quadratic_row(const Stencil &s, const Points &points, const Cloud &cloud, const Basis &lap,
-                   Row &row) {
+template <int dim>
+void quadratic_row(const Stencil<dim> &s, const Points<dim> &points, const Cloud<dim> &cloud,
+                   const Basis<dim> &lap, Row<dim> &row) {
   std::size_t k = 0;
-  for_each_neighbour(s, [&](const Neighbour &n) {
+  for_each_neighbour(s, [&](const Neighbour<dim> &n) {
     row.neighbour[k++] = n.w * lap.dot(quadratic_basis(n.q));
   });
-  for_each_wall_row(s, cloud, [&](int m, const Projection &p) {
-    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+  for_each_wall_row(s, cloud, [&](int m, const Projection<dim> &p) {
+    const Vec<dim> q = (p.point - points.position[s.i]) / s.h;
     row.wall[m] = wall_weight * s.h * lap.dot(normal_derivative(q, p.normal));
   });
 }
@@ -154,38 +164,41 @@ void quadratic_row(const Stencil &s, const Points &points, const Cloud &cloud, c
 /// o the offset. Exact for linear fields and |r|^2. `skew` = B o = 0 gives positive weights.
 /// Source: Basic, Degiuli, Ban, J. Comput. Phys. 354 (2018) 268 (form reconstructed; verified by
 /// its identities in the tests).
-void renormalised_row(const Stencil &s, const Points &points, const Cloud &cloud,
-                      const Vec<2> &skew, Row &row) {
+template <int dim>
+void renormalised_row(const Stencil<dim> &s, const Points<dim> &points, const Cloud<dim> &cloud,
+                      const Vec<dim> &skew, Row<dim> &row) {
   double denominator = 0;
   std::size_t k = 0;
-  for_each_neighbour(s, [&](const Neighbour &n) {
+  for_each_neighbour(s, [&](const Neighbour<dim> &n) {
     const double a = n.w * (1 - n.q.dot(skew));
     row.neighbour[k++] = a;
     denominator += a * n.q.squaredNorm();
   });
-  for_each_wall_row(s, cloud, [&](int m, const Projection &p) {
-    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+  for_each_wall_row(s, cloud, [&](int m, const Projection<dim> &p) {
+    const Vec<dim> q = (p.point - points.position[s.i]) / s.h;
     const double a = weight(std::min(q.norm(), 1.0)) * (1 - q.dot(skew));
     row.wall[m] = a * p.distance;
     denominator += a * q.squaredNorm();
   });
-  const double scale = denominator != 0 ? 4 / (denominator * s.h * s.h) : 0.0;
+  const double scale = denominator != 0 ? 2 * dim / (denominator * s.h * s.h) : 0.0;
   for (double &a : row.neighbour)
     a *= scale;
   for (double &a : row.wall)
     a *= scale;
 }
 
-Vec<2> renormalising_skew(const Stencil &s, const Points &points, const Cloud &cloud) {
-  LinearFit fit;
-  Vec<2> offset = Vec<2>::Zero();
-  const auto add = [&](const Vec<2> &q, double w) {
+template <int dim>
+Vec<dim> renormalising_skew(const Stencil<dim> &s, const Points<dim> &points,
+                            const Cloud<dim> &cloud) {
+  LinearFit<dim> fit;
+  Vec<dim> offset = Vec<dim>::Zero();
+  const auto add = [&](const Vec<dim> &q, double w) {
     fit.add(q, w);
     offset += w * q;
   };
-  for_each_neighbour(s, [&](const Neighbour &n) { add(n.q, n.w); });
-  for_each_wall_row(s, cloud, [&](int, const Projection &p) {
-    const Vec<2> q = (p.point - points.position[s.i]) / s.h;
+  for_each_neighbour(s, [&](const Neighbour<dim> &n) { add(n.q, n.w); });
+  for_each_wall_row(s, cloud, [&](int, const Projection<dim> &p) {
+    const Vec<dim> q = (p.point - points.position[s.i]) / s.h;
     add(q, weight(std::min(q.norm(), 1.0)));
   });
   return fit.inverse() * offset;
@@ -194,11 +207,11 @@ Vec<2> renormalising_skew(const Stencil &s, const Points &points, const Cloud &c
 enum class RowKind { quadratic, linear, plain };
 
 /// The fallback ladder: the first row whose signs keep the matrix definite.
-RowKind laplacian_row(const Stencil &s, const Points &points, const Cloud &cloud,
-                      const QuadraticFit *fit, double guard, Row &row) {
+template <int dim>
+RowKind laplacian_row(const Stencil<dim> &s, const Points<dim> &points, const Cloud<dim> &cloud,
+                      const QuadraticFit<dim> *fit, double guard, Row<dim> &row) {
   if (fit) {
-    const double h2 = s.h * s.h;
-    quadratic_row(s, points, cloud, fit->solve({0, 0, 2 / h2, 0, 2 / h2}), row);
+    quadratic_row(s, points, cloud, fit->solve(laplacian_functional<dim>(s.h)), row);
     if (!has_wrong_signs(row, guard))
       return RowKind::quadratic;
   }
@@ -207,19 +220,20 @@ RowKind laplacian_row(const Stencil &s, const Points &points, const Cloud &cloud
   if (!has_wrong_signs(row, guard))
     return RowKind::linear;
   row.wall = {};
-  renormalised_row(s, points, cloud, Vec<2>::Zero(), row);
+  renormalised_row<dim>(s, points, cloud, Vec<dim>::Zero(), row);
   return RowKind::plain;
 }
 
 /// Row of a surface point: pressure falls linearly to zero at the plane half a spacing outside,
 /// p_i = a D/2 with the slope a fitted to the interior neighbours at depth d_j below the plane:
 /// p_i = D/2 sum w d_j p_j / sum w d_j^2. Exact for hydrostatic pressure; an M-matrix row.
-void surface_row(const Stencil &s, const Cloud &cloud, std::span<double> entry) {
-  const Vec<2> &n = cloud.surface_normal[s.i];
+template <int dim>
+void surface_row(const Stencil<dim> &s, const Cloud<dim> &cloud, std::span<double> entry) {
+  const Vec<dim> &n = cloud.surface_normal[s.i];
   const double half = 0.5 * cloud.spacing / s.h;
   double denominator = 0;
   std::size_t k = 0;
-  for_each_neighbour(s, [&](const Neighbour &m) {
+  for_each_neighbour(s, [&](const Neighbour<dim> &m) {
     const double depth = half - n.dot(m.q);
     const bool is_donor = cloud.kind[m.j] == PointKind::interior && depth > half;
     entry[k++] = is_donor ? -half * m.w * depth : 0.0;
@@ -231,7 +245,7 @@ void surface_row(const Stencil &s, const Cloud &cloud, std::span<double> entry) 
 
 // --- assembly -------------------------------------------------------------------------------
 
-void lay_out(const Cloud &cloud, PressureProblem &problem) {
+template <int dim> void lay_out(const Cloud<dim> &cloud, PressureProblem<dim> &problem) {
   const int n = static_cast<int>(cloud.kind.size());
   lay_out_rows(cloud.neighbours, problem.matrix);
   problem.fluid_source.resize(n);
@@ -241,16 +255,16 @@ void lay_out(const Cloud &cloud, PressureProblem &problem) {
   problem.wall_rows.assign(cloud.point_walls.size(), {});
 }
 
-class Assembler {
+template <int dim> class Assembler {
 public:
-  Assembler(const Points &points, const Cloud &cloud, const PressureParams &params,
-            std::span<const Vec<2>> velocity, std::span<const double> target, double dt,
-            PressureProblem &problem)
+  Assembler(const Points<dim> &points, const Cloud<dim> &cloud, const PressureParams &params,
+            VecView<dim> velocity, std::span<const double> target, double dt,
+            PressureProblem<dim> &problem)
       : points_(points), cloud_(cloud), params_(params), velocity_(velocity), target_(target),
         dt_(dt), problem_(problem) {}
 
   RowKind row(int i) const {
-    Stencil s;
+    Stencil<dim> s;
     gather(i, points_, cloud_, s);
     if (cloud_.kind[i] != PointKind::interior) {
       open_row(s);
@@ -260,12 +274,12 @@ public:
   }
 
 private:
-  std::span<double> off_diagonal(const Stencil &s) const {
+  std::span<double> off_diagonal(const Stencil<dim> &s) const {
     return {problem_.matrix.value.data() + problem_.matrix.row_start[s.i] + 1,
             static_cast<std::size_t>(s.count)};
   }
 
-  void open_row(const Stencil &s) const {
+  void open_row(const Stencil<dim> &s) const {
     problem_.matrix.value[problem_.matrix.row_start[s.i]] = 1;
     problem_.fluid_source[s.i] = 0;
     surface_row(s, cloud_, off_diagonal(s));
@@ -275,16 +289,16 @@ private:
       problem_.wall_rows[cloud_.wall_slot[s.i]] = {};
   }
 
-  RowKind poisson_row(const Stencil &s) const {
-    QuadraticFit fit = quadratic_fit(s, points_, cloud_);
+  RowKind poisson_row(const Stencil<dim> &s) const {
+    QuadraticFit<dim> fit = quadratic_fit(s, points_, cloud_);
     const bool regular = fit.factorise() && set_quadratic_gradient(s, fit);
-    Row row{off_diagonal(s), {}};
+    Row<dim> row{off_diagonal(s), {}};
     const RowKind kind =
         laplacian_row(s, points_, cloud_, regular ? &fit : nullptr, params_.row_guard, row);
     if (kind != RowKind::quadratic)
       problem_.gradient[s.i] = linear_gradient(s, cloud_);
     bool near_wall = false;
-    for_each_wall_row(s, cloud_, [&](int, const Projection &) { near_wall = true; });
+    for_each_wall_row(s, cloud_, [&](int, const Projection<dim> &) { near_wall = true; });
     const bool symmetric = kind == RowKind::quadratic && !near_wall;
     update_velocity_gradient(s, symmetric ? problem_.gradient[s.i] : linear_functional(s));
     update_wall_rows(s, row.wall);
@@ -294,39 +308,40 @@ private:
 
   // False when the cloud hardly determines the quadratic: on a lattice the functionals have a norm
   // of 2.5 / h, next to walls 11 / h; beyond the limit they amplify the noise of single points.
-  bool set_quadratic_gradient(const Stencil &s, const QuadraticFit &fit) const {
+  bool set_quadratic_gradient(const Stencil<dim> &s, const QuadraticFit<dim> &fit) const {
     constexpr double largest_norm = 20;
     auto &gradient = problem_.gradient[s.i];
-    gradient.col(0) = fit.solve({1 / s.h, 0, 0, 0, 0});
-    gradient.col(1) = fit.solve({0, 1 / s.h, 0, 0, 0});
+    for (int d = 0; d < dim; ++d)
+      gradient.col(d) = fit.solve(derivative_functional<dim>(d, s.h));
     return gradient.norm() * s.h < largest_norm;
   }
 
-  Eigen::Matrix<double, 5, 2> linear_functional(const Stencil &s) const {
-    Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
-    functional.topRows<2>() = fluid_gradient(s);
+  Functionals<dim> linear_functional(const Stencil<dim> &s) const {
+    Functionals<dim> functional = Functionals<dim>::Zero();
+    functional.template topRows<dim>() = fluid_gradient(s);
     return functional;
   }
 
-  void update_velocity_gradient(const Stencil &s,
-                                const Eigen::Matrix<double, 5, 2> &functional) const {
+  void update_velocity_gradient(const Stencil<dim> &s, const Functionals<dim> &functional) const {
     problem_.velocity_gradient[s.i] = velocity_gradient(s, velocity_, functional);
   }
 
-  void update_wall_rows(const Stencil &s, const std::array<double, 3> &laplacian) const {
+  void update_wall_rows(const Stencil<dim> &s,
+                        const std::array<double, most_projections<dim>> &laplacian) const {
     const double scale = cloud_.spacing * cloud_.spacing;
-    for_each_wall_row(s, cloud_, [&](int m, const Projection &p) {
-      const Vec<2> r = p.point - points_.position[s.i];
-      const Vec<2> u = velocity_[s.i] + problem_.velocity_gradient[s.i] * r;
-      WallRow &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
+    for_each_wall_row(s, cloud_, [&](int m, const Projection<dim> &p) {
+      const Vec<dim> r = p.point - points_.position[s.i];
+      const Vec<dim> u = velocity_[s.i] + problem_.velocity_gradient[s.i] * r;
+      WallRow<dim> &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
       wall.approach = p.normal.dot(u);
       wall.laplacian = scale * laplacian[m];
-      wall.gradient = wall_weight * s.h *
-                      (problem_.gradient[s.i].transpose() * normal_derivative(r / s.h, p.normal));
+      wall.gradient =
+          wall_weight * s.h *
+          (problem_.gradient[s.i].transpose() * normal_derivative<dim>(r / s.h, p.normal));
     });
   }
 
-  void finish_poisson_row(const Stencil &s, const Row &row) const {
+  void finish_poisson_row(const Stencil<dim> &s, const Row<dim> &row) const {
     const double scale = cloud_.spacing * cloud_.spacing;
     double sum = 0;
     for (double &a : row.neighbour) {
@@ -334,31 +349,31 @@ private:
       sum -= a;
     }
     problem_.matrix.value[problem_.matrix.row_start[s.i]] = sum > 0 ? sum : 1.0;
-    double source = params_.density / dt_ *
-                    (problem_.velocity_gradient[s.i].trace() - target_[s.i]) * scale;
-    for_each_wall_row(s, cloud_, [&](int m, const Projection &) {
-      const WallRow &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
+    double source =
+        params_.density / dt_ * (problem_.velocity_gradient[s.i].trace() - target_[s.i]) * scale;
+    for_each_wall_row(s, cloud_, [&](int m, const Projection<dim> &) {
+      const WallRow<dim> &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
       source -= wall.laplacian * params_.density / dt_ * wall.approach;
     });
     problem_.fluid_source[s.i] = -source;
   }
 
-  const Points &points_;
-  const Cloud &cloud_;
+  const Points<dim> &points_;
+  const Cloud<dim> &cloud_;
   const PressureParams &params_;
-  std::span<const Vec<2>> velocity_;
+  VecView<dim> velocity_;
   std::span<const double> target_;
   double dt_;
-  PressureProblem &problem_;
+  PressureProblem<dim> &problem_;
 };
 
 // --- tension ----------------------------------------------------------------------------------
 
-bool is_next_to_air(int i, const Points &points, const Cloud &cloud) {
+template <int dim> bool is_next_to_air(int i, const Points<dim> &points, const Cloud<dim> &cloud) {
   const double near = 1.5 * cloud.spacing;
   for (const int j : cloud.neighbours.of(i)) {
-    const bool is_air = cloud.kind[j] != PointKind::interior ||
-                        points.at_surface[j] == SurfaceMemory::released;
+    const bool is_air =
+        cloud.kind[j] != PointKind::interior || points.at_surface[j] == SurfaceMemory::released;
     if (is_air && (points.position[j] - points.position[i]).squaredNorm() < near * near)
       return true;
   }
@@ -366,7 +381,8 @@ bool is_next_to_air(int i, const Points &points, const Cloud &cloud) {
 }
 
 // One Jacobi step from the last pressure: is row i pulled below zero?
-bool is_in_tension(int i, const Points &points, const PressureProblem &problem) {
+template <int dim>
+bool is_in_tension(int i, const Points<dim> &points, const PressureProblem<dim> &problem) {
   const SparseMatrix &matrix = problem.matrix;
   double pull = problem.source[i];
   for (int k = matrix.row_start[i] + 1; k < matrix.row_start[i + 1]; ++k)
@@ -376,10 +392,10 @@ bool is_in_tension(int i, const Points &points, const PressureProblem &problem) 
 
 } // namespace
 
-int release_tension(Points &points, const Walls &walls, const PressureParams &params,
-                    std::span<const Vec<2>> predicted_velocity,
-                    std::span<const double> target_divergence, double dt, Cloud &cloud,
-                    PressureProblem &problem) {
+template <int dim>
+int release_tension(Points<dim> &points, const Walls<dim> &walls, const PressureParams &params,
+                    VecView<dim> predicted_velocity, std::span<const double> target_divergence,
+                    double dt, Cloud<dim> &cloud, PressureProblem<dim> &problem) {
   set_wall_velocity(walls, cloud, params, dt, problem);
   std::vector<char> released(points.size(), 0);
   for_each_point(points.size(), [&](int i) {
@@ -396,8 +412,8 @@ int release_tension(Points &points, const Walls &walls, const PressureParams &pa
       changed.push_back(i);
     }
   }
-  const Assembler assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
-                           problem);
+  const Assembler<dim> assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
+                                problem);
   for (const int i : changed) {
     assemble.row(i);
     for (const int j : cloud.neighbours.of(i))
@@ -407,36 +423,41 @@ int release_tension(Points &points, const Walls &walls, const PressureParams &pa
   return static_cast<int>(changed.size());
 }
 
-void assemble_pressure(const Points &points, const Cloud &cloud, const PressureParams &params,
-                       std::span<const Vec<2>> predicted_velocity,
+template <int dim>
+void assemble_pressure(const Points<dim> &points, const Cloud<dim> &cloud,
+                       const PressureParams &params, VecView<dim> predicted_velocity,
                        std::span<const double> target_divergence, double dt,
-                       PressureProblem &problem) {
+                       PressureProblem<dim> &problem) {
   lay_out(cloud, problem);
-  const Assembler assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
-                           problem);
-  const auto counts = block_sums<3>(points.size(), [&](IndexRange range) {
-    std::array<double, 3> count{};
-    for (int i = range.begin; i < range.end; ++i)
-      count[static_cast<std::size_t>(assemble.row(i))] += 1;
-    return count;
-  }, Work::heavy);
+  const Assembler<dim> assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
+                                problem);
+  const auto counts = block_sums<3>(
+      points.size(),
+      [&](IndexRange range) {
+        std::array<double, 3> count{};
+        for (int i = range.begin; i < range.end; ++i)
+          count[static_cast<std::size_t>(assemble.row(i))] += 1;
+        return count;
+      },
+      Work::heavy);
   problem.rows = {static_cast<int>(counts[0]), static_cast<int>(counts[1]),
                   static_cast<int>(counts[2])};
   problem.has_open_point = std::any_of(cloud.kind.begin(), cloud.kind.end(),
                                        [](PointKind kind) { return kind != PointKind::interior; });
 }
 
-void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressureParams &params,
-                       double dt, PressureProblem &problem) {
+template <int dim>
+void set_wall_velocity(const Walls<dim> &walls, const Cloud<dim> &cloud,
+                       const PressureParams &params, double dt, PressureProblem<dim> &problem) {
   problem.source = problem.fluid_source;
   const double factor = params.density / dt;
   for_each_index(static_cast<int>(cloud.wall_points.size()), [&](int k) {
-    const PointWalls &projections = cloud.point_walls[k];
+    const PointWalls<dim> &projections = cloud.point_walls[k];
     for (int m = 0; m < projections.count; ++m) {
-      const Projection &p = projections.projection[m];
+      const Projection<dim> &p = projections.projection[m];
       if (!has_row(p, cloud))
         continue;
-      WallRow &wall = problem.wall_rows[k][m];
+      WallRow<dim> &wall = problem.wall_rows[k][m];
       const double wall_speed = p.normal.dot(wall_velocity(walls, p));
       wall.datum = factor * (wall.approach - wall_speed);
       problem.source[cloud.wall_points[k]] -= wall.laplacian * factor * wall_speed;
@@ -444,25 +465,43 @@ void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressurePar
   });
 }
 
-Vec<2> pressure_gradient(int i, const Points &points, const Cloud &cloud,
-                         const PressureProblem &problem, std::span<const double> pressure) {
-  Stencil s;
+template <int dim>
+Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
+                           const PressureProblem<dim> &problem, std::span<const double> pressure) {
+  Stencil<dim> s;
   gather(i, points, cloud, s);
   const auto &functional = problem.gradient[i];
-  Vec<2> gradient = Vec<2>::Zero();
-  for_each_neighbour(s, [&](const Neighbour &n) {
+  Vec<dim> gradient = Vec<dim>::Zero();
+  for_each_neighbour(s, [&](const Neighbour<dim> &n) {
     const double scaled = n.w * (pressure[n.j] - pressure[i]);
     gradient += scaled * (functional.transpose() * quadratic_basis(n.q));
   });
   if (s.open)
     gradient -= weight(s.open_side.norm()) * pressure[i] *
-                (functional.topRows<2>().transpose() * s.open_side);
+                (functional.template topRows<dim>().transpose() * s.open_side);
   else
-    for_each_wall_row(s, cloud, [&](int m, const Projection &) {
-      const WallRow &wall = problem.wall_rows[cloud.wall_slot[i]][m];
+    for_each_wall_row(s, cloud, [&](int m, const Projection<dim> &) {
+      const WallRow<dim> &wall = problem.wall_rows[cloud.wall_slot[i]][m];
       gradient += wall.datum * wall.gradient;
     });
   return gradient;
 }
+
+template int release_tension(Points<2> &, const Walls<2> &, const PressureParams &, VecView<2>,
+                             std::span<const double>, double, Cloud<2> &, PressureProblem<2> &);
+template void assemble_pressure(const Points<2> &, const Cloud<2> &, const PressureParams &,
+                                VecView<2>, std::span<const double>, double, PressureProblem<2> &);
+template void set_wall_velocity(const Walls<2> &, const Cloud<2> &, const PressureParams &, double,
+                                PressureProblem<2> &);
+template Vec<2> pressure_gradient(int, const Points<2> &, const Cloud<2> &,
+                                  const PressureProblem<2> &, std::span<const double>);
+template int release_tension(Points<3> &, const Walls<3> &, const PressureParams &, VecView<3>,
+                             std::span<const double>, double, Cloud<3> &, PressureProblem<3> &);
+template void assemble_pressure(const Points<3> &, const Cloud<3> &, const PressureParams &,
+                                VecView<3>, std::span<const double>, double, PressureProblem<3> &);
+template void set_wall_velocity(const Walls<3> &, const Cloud<3> &, const PressureParams &, double,
+                                PressureProblem<3> &);
+template Vec<3> pressure_gradient(int, const Points<3> &, const Cloud<3> &,
+                                  const PressureProblem<3> &, std::span<const double>);
 
 } // namespace sluice::fluid

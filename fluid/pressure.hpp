@@ -18,11 +18,11 @@
 namespace sluice::fluid {
 
 /// Coefficients of one projection in the rows of its point.
-struct WallRow {
-  double approach = 0;      // n . u* of the fluid at the wall, extrapolated [m/s]
-  double laplacian = 0;     // of the datum g in the point's Laplacian row, times spacing^2 [m]
-  Vec<2> gradient{0, 0};    // of the datum g in the point's gradient [-]
-  double datum = 0;         // g = n . grad p [Pa/m], with the latest wall velocity
+template <int dim> struct WallRow {
+  double approach = 0;  // n . u* of the fluid at the wall, extrapolated [m/s]
+  double laplacian = 0; // of the datum g in the point's Laplacian row, times spacing^2 [m]
+  Vec<dim> gradient = Vec<dim>::Zero(); // of the datum g in the point's gradient [-]
+  double datum = 0;                     // g = n . grad p [Pa/m], with the latest wall velocity
 };
 
 /// How the rows were made, for the run report.
@@ -33,45 +33,48 @@ struct RowCounts {
 };
 
 /// The discrete pressure problem of one step.
-struct PressureProblem {
-  SparseMatrix matrix;              // rows scaled by spacing^2: entries of order one
-  std::vector<double> fluid_source; // right-hand side without the wall velocity
-  std::vector<double> source;       // right-hand side with it
-  std::vector<Eigen::Matrix<double, 5, 2>> gradient; // functionals of d/dx and d/dy per point
-  std::vector<std::array<WallRow, 3>> wall_rows;     // per wall slot
-  std::vector<Mat<2>> velocity_gradient;             // of u* [1/s], row: component
+template <int dim> struct PressureProblem {
+  SparseMatrix matrix;                    // rows scaled by spacing^2: entries of order one
+  std::vector<double> fluid_source;       // right-hand side without the wall velocity
+  std::vector<double> source;             // right-hand side with it
+  std::vector<Functionals<dim>> gradient; // of the derivatives per point
+  std::vector<std::array<WallRow<dim>, most_projections<dim>>> wall_rows; // per wall slot
+  std::vector<Mat<dim>> velocity_gradient; // of u* [1/s], row: component
   RowCounts rows;
   bool has_open_point = false; // else pressure is known up to a constant
 };
 
 struct PressureParams {
-  double density = 1000;       // [kg/m^3]
-  double row_guard = 0.1;      // largest ratio of negative to positive weights in a row
+  double density = 1000;  // [kg/m^3]
+  double row_guard = 0.1; // largest ratio of negative to positive weights in a row
 };
 
 /// Assembles matrix, fluid source and gradient functionals. `target_divergence` [1/s] per point is
 /// the rate at which a cell shall grow (volume control); `dt` [s].
-void assemble_pressure(const Points &points, const Cloud &cloud, const PressureParams &params,
-                       std::span<const Vec<2>> predicted_velocity,
+template <int dim>
+void assemble_pressure(const Points<dim> &points, const Cloud<dim> &cloud,
+                       const PressureParams &params, VecView<dim> predicted_velocity,
                        std::span<const double> target_divergence, double dt,
-                       PressureProblem &problem);
+                       PressureProblem<dim> &problem);
 
 /// Water next to air bears no tension: an interior point that touches an open one, or one that was
 /// released in the last step, and whose row would pull its pressure below zero becomes open itself,
 /// pressure zero, held by no wall. So a jet
 /// separates from an edge and spray flies freely. Decided once per step, before the coupling
 /// iterates (the map stays affine). Returns the number of points released.
-int release_tension(Points &points, const Walls &walls, const PressureParams &params,
-                    std::span<const Vec<2>> predicted_velocity,
-                    std::span<const double> target_divergence, double dt, Cloud &cloud,
-                    PressureProblem &problem);
+template <int dim>
+int release_tension(Points<dim> &points, const Walls<dim> &walls, const PressureParams &params,
+                    VecView<dim> predicted_velocity, std::span<const double> target_divergence,
+                    double dt, Cloud<dim> &cloud, PressureProblem<dim> &problem);
 
 /// Sets the wall data and the right-hand side for the current wall velocity.
-void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressureParams &params,
-                       double dt, PressureProblem &problem);
+template <int dim>
+void set_wall_velocity(const Walls<dim> &walls, const Cloud<dim> &cloud,
+                       const PressureParams &params, double dt, PressureProblem<dim> &problem);
 
 /// grad p at a point [Pa/m]: wall data and the surface's zero included.
-Vec<2> pressure_gradient(int i, const Points &points, const Cloud &cloud,
-                         const PressureProblem &problem, std::span<const double> pressure);
+template <int dim>
+Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
+                           const PressureProblem<dim> &problem, std::span<const double> pressure);
 
 } // namespace sluice::fluid

@@ -2,6 +2,7 @@
 #include "fluid/scene.hpp"
 
 #include "bridge/base/check.hpp"
+#include "fluid/coordinates.hpp"
 
 #include <algorithm>
 #include <cctype>
@@ -15,64 +16,159 @@ namespace {
 
 // --- walls ----------------------------------------------------------------------------------
 
-void add_leg(Walls &walls, const WallParams &wall, int wall_index, const Vec<2> &to) {
-  const int first = static_cast<int>(walls.position.size()) - 1;
-  const Vec<2> from = walls.position[first];
-  const double length = (to - from).norm();
-  constexpr double most_pieces = 1e6;
-  const double wanted =
-      wall.segment_length > 0 ? std::ceil(length / wall.segment_length - 1e-9) : 1;
-  check(wanted <= most_pieces, "wall '{}': segment_length_m = {} m cuts a leg of {} m into {:.3g} "
-                               "pieces, at most {:.0e} are handled",
-        wall.name, wall.segment_length, length, wanted, most_pieces);
-  const int pieces = std::max(1, static_cast<int>(wanted));
-  for (int k = 1; k <= pieces; ++k) {
-    const double t = static_cast<double>(k) / pieces;
-    walls.position.push_back(k == pieces ? to : Vec<2>((1 - t) * from + t * to));
-    const int b = first + k;
-    if (wall.coupled)
-      walls.coupled_segments.push_back(static_cast<int>(walls.segments.size()));
-    walls.segments.push_back({b - 1, b, -1, -1, wall_index});
-  }
+// Places along z where what is given in the plane is repeated: both ends, and in between so that no
+// coupled triangle is wider than its segments are long. One list for all walls: their triangles
+// meet.
+std::vector<double> swept_places(const std::vector<WallParams> &tables, double depth) {
+  double longest = depth;
+  for (const WallParams &wall : tables)
+    if (wall.segment_length > 0)
+      longest = std::min(longest, wall.segment_length);
+  const int pieces = std::max(1, static_cast<int>(std::ceil(depth / longest - 1e-9)));
+  std::vector<double> z;
+  for (int k = 0; k <= pieces; ++k)
+    z.push_back(depth * k / pieces);
+  return z;
 }
 
-void add_wall(Walls &walls, const WallParams &wall) {
-  const int index = static_cast<int>(walls.names.size());
-  walls.names.push_back(wall.name);
-  const int first = static_cast<int>(walls.position.size());
-  walls.position.push_back(wall.points.front());
-  for (std::size_t k = 1; k < wall.points.size(); ++k) {
-    check((wall.points[k] - wall.points[k - 1]).norm() > 1e-9,
-          "wall '{}': points {} and {} coincide at ({}, {}) m", wall.name, k - 1, k,
-          wall.points[k].x(), wall.points[k].y());
-    add_leg(walls, wall, index, wall.points[k]);
+/// Adds the walls of the case file to the scene's.
+template <int dim> class WallBuilder {
+public:
+  WallBuilder(const std::vector<WallParams> &tables, double depth, Walls<dim> &walls)
+      : walls_(walls) {
+    if constexpr (dim == 3)
+      z_ = swept_places(tables, depth);
+    else
+      z_ = {0};
   }
-  if (wall.coupled)
-    for (int v = first; v < static_cast<int>(walls.position.size()); ++v)
-      walls.coupled_vertices.push_back(v);
-}
+
+  void add(const WallParams &wall) {
+    start(wall.name, wall.condition);
+    const int first = static_cast<int>(walls_.position.size());
+    const int first_face = static_cast<int>(walls_.faces.size());
+    const std::vector<Vec<2>> outline = cut_into_segments(wall);
+    for (const Vec<2> &x : outline)
+      for (const double z : z_)
+        walls_.position.push_back(place(x, z));
+    for (int k = 1; k < static_cast<int>(outline.size()); ++k)
+      add_segment(first + (k - 1) * n_z(), first + k * n_z());
+    for (int f = first_face; f < static_cast<int>(walls_.faces.size()); ++f)
+      walls_.faces[f].number = f - first_face;
+    if (!wall.coupled)
+      return;
+    for (int v = first; v < static_cast<int>(walls_.position.size()); ++v)
+      walls_.coupled_vertices.push_back(v);
+    for (int f = first_face; f < static_cast<int>(walls_.faces.size()); ++f)
+      walls_.coupled_faces.push_back(f);
+  }
+
+  /// Rectangles at both ends of the sweep, around all that has been added.
+  void add_sides(const std::string &condition) requires(dim == 3) {
+    Vec<3> low = walls_.position.front(), high = low;
+    for (const Vec<3> &x : walls_.position) {
+      low = low.cwiseMin(x);
+      high = high.cwiseMax(x);
+    }
+    start("sides", condition);
+    for (const double z : {z_.front(), z_.back()}) {
+      const int a = static_cast<int>(walls_.position.size());
+      for (const Vec<2> &x : {Vec<2>(low.x(), low.y()), Vec<2>(high.x(), low.y()),
+                              Vec<2>(high.x(), high.y()), Vec<2>(low.x(), high.y())})
+        walls_.position.push_back(place(x, z));
+      const bool is_low = z == z_.front(); // seen from the fluid, counter-clockwise
+      add_face(is_low ? std::array{a, a + 1, a + 2} : std::array{a, a + 2, a + 1});
+      add_face(is_low ? std::array{a, a + 2, a + 3} : std::array{a, a + 3, a + 2});
+    }
+  }
+
+private:
+  int n_z() const { return static_cast<int>(z_.size()); }
+
+  static Vec<dim> place(const Vec<2> &x, [[maybe_unused]] double z) {
+    if constexpr (dim == 2)
+      return x;
+    else
+      return {x.x(), x.y(), z};
+  }
+
+  void start(const std::string &name, const std::string &condition) {
+    walls_.names.push_back(name);
+    walls_.slip.push_back(condition == "free-slip" ? Slip::free : Slip::none);
+  }
+
+  void add_face(const std::array<int, dim> &vertex) {
+    walls_.faces.push_back({vertex, static_cast<int>(walls_.names.size()) - 1});
+  }
+
+  // The segment between two vertices, or the triangles between two rows of vertices along z.
+  void add_segment(int a, int b) {
+    if constexpr (dim == 2)
+      add_face({a, b});
+    else
+      for (int k = 0; k + 1 < n_z(); ++k) {
+        add_face({a + k, a + k + 1, b + k});
+        add_face({b + k, a + k + 1, b + k + 1});
+      }
+  }
+
+  static std::vector<Vec<2>> cut_into_segments(const WallParams &wall) {
+    std::vector<Vec<2>> outline{wall.points.front()};
+    for (std::size_t k = 1; k < wall.points.size(); ++k) {
+      check((wall.points[k] - wall.points[k - 1]).norm() > 1e-9,
+            "wall '{}': points {} and {} coincide at {} m", wall.name, k - 1, k,
+            text_of(wall.points[k]));
+      cut_leg(wall, wall.points[k], outline);
+    }
+    return outline;
+  }
+
+  static void cut_leg(const WallParams &wall, const Vec<2> &to, std::vector<Vec<2>> &outline) {
+    const Vec<2> from = outline.back();
+    const double length = (to - from).norm();
+    constexpr double most_pieces = 1e6;
+    const double wanted =
+        wall.segment_length > 0 ? std::ceil(length / wall.segment_length - 1e-9) : 1;
+    check(wanted <= most_pieces,
+          "wall '{}': segment_length_m = {} m cuts a leg of {} m into {:.3g} "
+          "pieces, at most {:.0e} are handled",
+          wall.name, wall.segment_length, length, wanted, most_pieces);
+    const int pieces = std::max(1, static_cast<int>(wanted));
+    for (int k = 1; k <= pieces; ++k) {
+      const double t = static_cast<double>(k) / pieces;
+      outline.push_back(k == pieces ? to : Vec<2>((1 - t) * from + t * to));
+    }
+  }
+
+  Walls<dim> &walls_;
+  std::vector<double> z_; // [m]
+};
 
 // Names become columns and groups of the output.
 template <class Named> void check_names(const std::vector<Named> &all, std::string_view kind) {
   std::set<std::string> seen;
   for (const Named &one : all) {
-    const bool is_plain = !one.name.empty() &&
-                          std::all_of(one.name.begin(), one.name.end(), [](unsigned char c) {
-                            return std::isalnum(c) || c == '_' || c == '-';
-                          });
+    const bool is_plain =
+        !one.name.empty() && std::all_of(one.name.begin(), one.name.end(), [](unsigned char c) {
+          return std::isalnum(c) || c == '_' || c == '-';
+        });
     check(is_plain, "{} '{}': a name has letters, digits, '_' and '-' only", kind, one.name);
     check(seen.insert(one.name).second, "two {}s are called '{}'", kind, one.name);
   }
 }
 
-Walls read_walls(const Config &config) {
-  Walls walls;
+template <int dim> Walls<dim> read_walls(const Config &config, const FluidParams<dim> &params) {
+  Walls<dim> walls;
   const auto tables = config.read_all<WallParams>("fluid.wall");
+  check(!tables.empty(), "{}: the scene has no [[fluid.wall]]", config.file_name());
   check_names(tables, "wall");
+  WallBuilder<dim> builder(tables, params.depth, walls);
   for (const WallParams &wall : tables)
-    add_wall(walls, wall);
-  walls.velocity.assign(walls.position.size(), Vec<2>::Zero());
-  link_outlines(walls);
+    builder.add(wall);
+  if constexpr (dim == 3)
+    if (params.side_walls != "none")
+      builder.add_sides(params.side_walls);
+  walls.velocity.assign(walls.position.size(), Vec<dim>::Zero());
+  link_faces(walls);
   return walls;
 }
 
@@ -126,19 +222,38 @@ std::vector<Vec<2>> lattice_in(const std::vector<Vec<2>> &polygon, double spacin
   return points;
 }
 
-void check_hole(const Scene &scene, const Vec<2> &x) {
-  const double nearest = distance_to_walls(scene.walls, x);
-  check(nearest < 0.5 * scene.params.spacing,
-        "hole in the walls below the water line at ({:.6g}, {:.6g}) m: the nearest wall is {:.3g} m "
-        "away; close the wall there, or set open_sides = true if the water is meant to run out",
-        x.x(), x.y(), nearest);
+// Centres of the layers of points along z.
+template <int dim> std::vector<double> layers(const FluidParams<dim> &params) {
+  std::vector<double> z;
+  if constexpr (dim == 2)
+    z = {0};
+  else
+    for (double k = 0.5; k * params.spacing < params.depth; ++k)
+      z.push_back(k * params.spacing);
+  return z;
 }
 
-// Every edge of the water that does not face upwards must lie on a wall.
-void check_holes(const Scene &scene) {
+template <int dim> Vec<dim> at_depth(const Vec<2> &x, [[maybe_unused]] double z) {
+  if constexpr (dim == 2)
+    return x;
+  else
+    return {x.x(), x.y(), z};
+}
+
+template <int dim> void check_hole(const Scene<dim> &scene, const Vec<dim> &x) {
+  const double nearest = distance_to_walls(scene.walls, x);
+  check(nearest < 0.5 * scene.params.spacing,
+        "hole in the walls below the water line at {} m: the nearest wall is {:.3g} m "
+        "away; close the wall there, or set open_sides = true if the water is meant to run out",
+        text_of(x), nearest);
+}
+
+// Every edge of the water that does not face upwards must lie on a wall, and both ends of the
+// sweep.
+template <int dim> void check_holes(const Scene<dim> &scene) {
   const std::vector<Vec<2>> &water = scene.params.water;
   const double orientation = signed_area(water) > 0 ? 1 : -1;
-  const Vec<2> up = -scene.params.gravity.normalized();
+  const Vec<2> up = -scene.params.gravity.template head<2>().normalized();
   for (std::size_t k = 0; k < water.size(); ++k) {
     const Vec<2> a = water[k], e = water[(k + 1) % water.size()] - a;
     const Vec<2> outward = -orientation * rotated_left(e).normalized();
@@ -146,50 +261,60 @@ void check_holes(const Scene &scene) {
       continue;
     const int samples = std::max(2, static_cast<int>(e.norm() / scene.params.spacing));
     for (int m = 0; m < samples; ++m)
-      check_hole(scene, a + (m + 0.5) / samples * e);
+      for (const double z : layers(scene.params))
+        check_hole(scene, at_depth<dim>(a + (m + 0.5) / samples * e, z));
   }
+  if constexpr (dim == 3)
+    for (const Vec<3> &x : scene.initial.points.position)
+      for (const double z : {0.0, scene.params.depth})
+        if (std::abs(x.z() - z) < scene.params.spacing)
+          check_hole(scene, Vec<3>(x.x(), x.y(), z));
 }
 
 // Below the highest corner of the water: what is shown at t = 0, and the first guess of the solver.
-std::vector<double> hydrostatic_pressure(const FluidParams &params,
-                                         const std::vector<Vec<2>> &positions) {
+template <int dim>
+std::vector<double> hydrostatic_pressure(const FluidParams<dim> &params,
+                                         const std::vector<Vec<dim>> &positions) {
   double at_surface = 1e300;
   for (const Vec<2> &corner : params.water)
-    at_surface = std::min(at_surface, params.gravity.dot(corner));
+    for (const double z : {0.0, params.depth})
+      at_surface = std::min(at_surface, params.gravity.dot(at_depth<dim>(corner, z)));
   std::vector<double> pressure;
-  for (const Vec<2> &x : positions)
+  for (const Vec<dim> &x : positions)
     pressure.push_back(params.density * (params.gravity.dot(x) - at_surface));
   return pressure;
 }
 
-void check_water(const FluidParams &params) {
+template <int dim> void check_water(const FluidParams<dim> &params) {
   const double area = std::abs(signed_area(params.water));
   const Box box = bounding_box(params.water);
-  const Vec<2> size = (box.high - box.low) / params.spacing;
+  Vec<dim> size = at_depth<dim>(box.high - box.low, params.depth) / params.spacing;
   constexpr double most_points = 2e8;
   check(area > 0, "water_m: the corners enclose no area; is an edge missing?");
   check(size.prod() <= most_points,
-        "water_m spans {:.3g} x {:.3g} points at a spacing of {} m, at most {:.0e} are handled; use "
+        "water_m spans {} points at a spacing of {} m, at most {:.0e} are handled; use "
         "a larger spacing_m",
-        size.x(), size.y(), params.spacing, most_points);
+        text_of_size(size), params.spacing, most_points);
   for (const Vec<2> &corner : params.water)
     check(corner.x() < params.outlet_x,
-          "the corner ({}, {}) m of water_m lies beyond the outlet at outlet_x_m = {}", corner.x(),
-          corner.y(), params.outlet_x);
+          "the corner {} m of water_m lies beyond the outlet at outlet_x_m = {}", text_of(corner),
+          params.outlet_x);
 }
 
-Points fill(const FluidParams &params) {
+template <int dim> Points<dim> fill(const FluidParams<dim> &params) {
   check_water(params);
-  Points points;
-  points.position =
+  Points<dim> points;
+  const std::vector<Vec<2>> section =
       lattice_in(params.water, params.spacing, params.lattice_angle * std::numbers::pi / 180);
+  for (const double z : layers(params))
+    for (const Vec<2> &x : section)
+      points.position.push_back(at_depth<dim>(x, z));
   const std::size_t n = points.position.size();
   check(n >= 4, "water_m holds {} points at a spacing of {} m; use a smaller spacing_m", n,
         params.spacing);
-  points.velocity.assign(n, Vec<2>::Zero());
-  points.previous_velocity.assign(n, Vec<2>::Zero());
-  points.shift.assign(n, Vec<2>::Zero());
-  points.shift_velocity.assign(n, Vec<2>::Zero());
+  for (auto *v :
+       {&points.velocity, &points.previous_velocity, &points.shift, &points.shift_velocity})
+    v->assign(n, Vec<dim>::Zero());
   points.pressure = hydrostatic_pressure(params, points.position);
   points.at_surface.assign(n, SurfaceMemory::enclosed);
   points.id.resize(n);
@@ -200,38 +325,62 @@ Points fill(const FluidParams &params) {
 
 } // namespace
 
-double volume_error(const Scene &scene) {
-  const double spacing = scene.params.spacing, area = std::abs(signed_area(scene.params.water));
-  return scene.initial.points.size() * spacing * spacing / area - 1;
+template <int dim> double volume_error(const Scene<dim> &scene) {
+  const FluidParams<dim> &params = scene.params;
+  const double spacing = params.spacing, area = std::abs(signed_area(params.water));
+  if constexpr (dim == 2)
+    return scene.initial.points.size() * spacing * spacing / area - 1;
+  else
+    return scene.initial.points.size() * volume_of_point<3>(spacing) / (area * params.depth) - 1;
 }
 
-void check_clear_of_walls(const Scene &scene, double tolerance) {
+template <int dim> void check_clear_of_walls(const Scene<dim> &scene, double tolerance) {
   const double spacing = scene.params.spacing;
   const auto &position = scene.initial.points.position;
-  const Grid grid = grid_over(scene.initial.points, 4 * spacing);
-  SegmentGrid near;
-  find_near_segments(scene.walls, grid, spacing, near);
-  for (const Vec<2> &x : position)
-    for (const Projection &p :
+  const Grid<dim> grid = grid_over(scene.initial.points, 4 * spacing);
+  FaceGrid near;
+  find_near_faces(scene.walls, grid, spacing, near);
+  for (const Vec<dim> &x : position)
+    for (const Projection<dim> &p :
          project_on_walls(scene.walls, near.near(grid.cell(x)), x, spacing))
       check(p.distance > -tolerance,
-            "the water overlaps wall '{}': a point at ({:.6g}, {:.6g}) m lies {:.3g} m behind it; "
+            "the water overlaps wall '{}': a point at {} m lies {:.3g} m behind it; "
             "correct water_m or the wall (the fluid lies on the left of its points_m)",
-            scene.walls.names[scene.walls.segments[p.segment].wall], x.x(), x.y(), -p.distance);
+            scene.walls.names[scene.walls.faces[p.face].wall], text_of(x), -p.distance);
 }
 
-Scene read_scene(const Config &config) {
-  Scene scene;
-  scene.params = config.read<FluidParams>("fluid");
-  scene.walls = read_walls(config);
-  scene.gauges = config.read_all<GaugeParams>("fluid.gauge");
+namespace {
+
+struct Dimension {
+  int value = 2;
+  template <class Reader> void describe(Reader &read) {
+    read("dimension", value, "2: per metre of depth; 3: in space")
+        .check(value == 2 || value == 3, "must be 2 or 3");
+  }
+};
+
+} // namespace
+
+int dimension_of(const Config &config) { return config.peek<Dimension>("fluid").value; }
+
+template <int dim> Scene<dim> read_scene(const Config &config) {
+  Scene<dim> scene;
+  scene.params = config.read<FluidParams<dim>>("fluid");
+  scene.walls = read_walls(config, scene.params);
+  scene.gauges = config.read_all<GaugeParams<dim>>("fluid.gauge");
   check_names(scene.gauges, "gauge");
-  check(!scene.walls.segments.empty(), "{}: the scene has no [[fluid.wall]]", config.file_name());
   scene.initial.points = fill(scene.params);
   check_clear_of_walls(scene, 0);
   if (!scene.params.open_sides && scene.params.gravity.norm() > 0)
     check_holes(scene);
   return scene;
 }
+
+template double volume_error(const Scene<2> &);
+template void check_clear_of_walls(const Scene<2> &, double);
+template Scene<2> read_scene(const Config &);
+template double volume_error(const Scene<3> &);
+template void check_clear_of_walls(const Scene<3> &, double);
+template Scene<3> read_scene(const Config &);
 
 } // namespace sluice::fluid

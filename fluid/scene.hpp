@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// From a case file to a scene: parameters, walls, and the water filled with points.
+// From a case file to a scene: parameters, walls, and the water filled with points. In space what
+// is given in the plane is swept along z: the same case file makes a channel of it.
 #pragma once
 
 #include "bridge/base/config.hpp"
@@ -13,12 +14,14 @@
 namespace sluice::fluid {
 
 /// Table [fluid].
-struct FluidParams {
+template <int dim> struct FluidParams {
   double spacing = 0;
   double density = 1000;
   double viscosity = 1e-3;
-  Vec<2> gravity{0, -9.81};
+  Vec<dim> gravity = -9.81 * Vec<dim>::Unit(1);
   std::vector<Vec<2>> water;
+  double depth = 0;
+  std::string side_walls = "free-slip";
   double lattice_angle = 0;
   double outlet_x = 1e300;
   bool open_sides = false;
@@ -30,19 +33,27 @@ struct FluidParams {
   MotionParams motion;
 
   template <class Reader> void describe(Reader &read) {
+    int dimension = dim;
+    read("dimension", dimension, "2: per metre of depth; 3: in space")
+        .check(dimension == dim, "must be 2 or 3");
     read.required("spacing_m", spacing, "distance between points").positive();
     read("density_kg_m3", density, "mass per volume").positive();
     read("dynamic_viscosity_pa_s", viscosity, "dynamic viscosity; 0 is inviscid").at_least(0);
     read("gravity_m_s2", gravity, "acceleration of gravity");
     read.required("water_m", water, "polygon that is filled with points at t = 0")
         .check(water.size() >= 3, "needs at least three corners");
+    if constexpr (dim == 3) {
+      read.required("depth_m", depth, "extent along z, from 0, of what is given in the plane")
+          .positive();
+      read("side_walls", side_walls, "walls at z = 0 and z = depth_m")
+          .one_of({"free-slip", "no-slip", "none"});
+    }
     read("lattice_angle_deg", lattice_angle, "angle by which the first lattice is turned")
         .at_least(-45)
         .at_most(45);
     read("outlet_x_m", outlet_x, "points beyond leave the scene and count as outflow");
     read("open_sides", open_sides, "water may touch air at its sides and below at t = 0");
-    read("coupled_walls", coupled_walls, "what coupled walls do")
-        .one_of({"move", "stay"});
+    read("coupled_walls", coupled_walls, "what coupled walls do").one_of({"move", "stay"});
     read("start_state", start_state,
          "file fluid_state.h5 of a run to go on from, instead of filling water_m");
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")
@@ -67,9 +78,10 @@ struct FluidParams {
   }
 };
 
-/// Table [[fluid.wall]]: a polyline with the fluid on its left.
+/// Table [[fluid.wall]]: a polyline with the fluid on its left; in space it is swept along z.
 struct WallParams {
   std::string name;
+  std::string condition = "no-slip";
   std::vector<Vec<2>> points;
   bool coupled = false;
   double segment_length = 0;
@@ -78,39 +90,46 @@ struct WallParams {
     read.required("name", name, "name of the wall");
     read.required("points_m", points, "polyline with the fluid on its left")
         .check(points.size() >= 2, "needs at least two points");
+    read("condition", condition, "what holds for viscous water that flows along the wall")
+        .one_of({"no-slip", "free-slip"});
     read("coupled", coupled, "moves with the partner of the bridge");
-    read("segment_length_m", segment_length, "longest segment; 0 keeps the given ones")
-        .at_least(0);
+    read("segment_length_m", segment_length, "longest segment; 0 keeps the given ones").at_least(0);
   }
 };
 
-/// Table [[fluid.gauge]]: water level at a place.
-struct GaugeParams {
+/// Table [[fluid.gauge]]: water level at a place, measured along y.
+template <int dim> struct GaugeParams {
   std::string name;
-  double x = 0;
+  double x = 0, z = 0;
 
   template <class Reader> void describe(Reader &read) {
     read.required("name", name, "name of the gauge: letters, digits, _ and -");
     read.required("x_m", x, "place of the gauge");
+    if constexpr (dim == 3)
+      read.required("z_m", z, "place of the gauge");
   }
 };
 
-struct Scene {
-  FluidParams params;
-  Walls walls;
-  std::vector<GaugeParams> gauges;
-  FluidState initial;
+template <int dim> struct Scene {
+  FluidParams<dim> params;
+  Walls<dim> walls;
+  std::vector<GaugeParams<dim>> gauges;
+  FluidState<dim> initial;
 };
 
-/// Area that the points stand for minus that of water_m, over the latter: what the lattice misses.
-double volume_error(const Scene &scene);
+/// Volume that the points stand for minus that of water_m, over the latter: what the lattice
+/// misses.
+template <int dim> double volume_error(const Scene<dim> &scene);
 
 /// Throws UserError, naming the point and the wall, if a point lies farther behind a wall than
 /// `tolerance` [m].
-void check_clear_of_walls(const Scene &scene, double tolerance);
+template <int dim> void check_clear_of_walls(const Scene<dim> &scene, double tolerance);
+
+/// Number of dimensions that the case file asks for, 2 or 3. Throws UserError on any other.
+int dimension_of(const Config &config);
 
 /// Reads the tables of the fluid and fills the water. Throws UserError, with place and numbers, on
 /// water that overlaps a wall, a hole in the walls below the water line, or too few points.
-Scene read_scene(const Config &config);
+template <int dim> Scene<dim> read_scene(const Config &config);
 
 } // namespace sluice::fluid

@@ -3,6 +3,7 @@
 
 #include "bridge/base/check.hpp"
 
+#include <array>
 #include <cmath>
 #include <hdf5.h>
 #include <string>
@@ -49,9 +50,9 @@ template <class T> struct Layout {
   using Number = std::conditional_t<std::is_enum_v<T>, std::uint8_t, T>;
   static constexpr int components = 1;
 };
-template <> struct Layout<Vec<2>> {
+template <int dim> struct Layout<Vec<dim>> {
   using Number = double;
-  static constexpr int components = 2;
+  static constexpr int components = dim;
 };
 
 // body(name, number) for every number of a state: the one list that writing and reading share.
@@ -65,8 +66,10 @@ template <class Saved, class Body> void for_each_number(Saved &saved, Body &&bod
   body("outflow_points", state.outflow_points);
   body("lost_points", state.lost_points);
   body("outlet_energy_j", state.outlet_energy);
-  body("outlet_momentum_x_n_s", state.outlet_momentum.x());
-  body("outlet_momentum_y_n_s", state.outlet_momentum.y());
+  constexpr std::array names{"outlet_momentum_x_n_s", "outlet_momentum_y_n_s",
+                             "outlet_momentum_z_n_s"};
+  for (int d = 0; d < state.outlet_momentum.size(); ++d)
+    body(names[d], state.outlet_momentum[d]);
 }
 
 class Writer {
@@ -77,11 +80,12 @@ public:
     expect(file_.is_valid());
   }
 
-  void write(const SavedState &saved) {
+  template <int dim> void write(const SavedState<dim> &saved) {
     write_text("format", format_name);
     write_number("version", std::int32_t{format_version});
     for_each_number(saved, [&](const char *name, const auto &x) { write_number(name, x); });
-    const Handle group(H5Gcreate2(file_, "points", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose);
+    const Handle group(H5Gcreate2(file_, "points", H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                       H5Gclose);
     expect(group.is_valid());
     for_each_array(saved.state.points,
                    [&](const char *name, const auto &x) { write_array(group, name, x); });
@@ -108,14 +112,13 @@ private:
     expect(attribute.is_valid() && H5Awrite(attribute, type, value) >= 0);
   }
 
-  template <class T>
-  void write_array(hid_t group, const char *name, const std::vector<T> &values) {
+  template <class T> void write_array(hid_t group, const char *name, const std::vector<T> &values) {
     const std::array<hsize_t, 2> size{values.size(), Layout<T>::components};
     const Handle space(H5Screate_simple(Layout<T>::components > 1 ? 2 : 1, size.data(), nullptr),
                        H5Sclose);
     const hid_t type = type_of<typename Layout<T>::Number>();
-    const Handle data(
-        H5Dcreate2(group, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Dclose);
+    const Handle data(H5Dcreate2(group, name, type, space, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT),
+                      H5Dclose);
     expect(data.is_valid() &&
            H5Dwrite(data, type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) >= 0);
   }
@@ -131,14 +134,15 @@ public:
     check(file_.is_valid(), "{}: not a readable HDF5 file", name_);
   }
 
-  SavedState read() {
+  template <int dim> SavedState<dim> read() {
     check(read_text("format") == format_name, "{}: not a state that sluice-fluid wrote", name_);
     std::int32_t version = 0;
     read_number("version", version);
-    check(version == format_version, "{}: written in version {} of the format, this program reads "
-                                     "version {}",
+    check(version == format_version,
+          "{}: written in version {} of the format, this program reads "
+          "version {}",
           name_, version, format_version);
-    SavedState saved;
+    SavedState<dim> saved;
     for_each_number(saved, [&](const char *name, auto &x) { read_number(name, x); });
     const Handle group(H5Gopen2(file_, "points", H5P_DEFAULT), H5Gclose);
     check(group.is_valid(), "{}: holds no points", name_);
@@ -167,7 +171,7 @@ private:
           "{}: the attribute '{}' is missing or damaged", name_, name);
   }
 
-  void check_values(const Points &points) const {
+  template <int dim> void check_values(const Points<dim> &points) const {
     for (int i = 0; i < points.size(); ++i) {
       check(points.position[i].allFinite() && points.velocity[i].allFinite() &&
                 points.previous_velocity[i].allFinite() && std::isfinite(points.pressure[i]),
@@ -222,7 +226,8 @@ private:
 
 } // namespace
 
-void write_state(const std::filesystem::path &file, const SavedState &saved) {
+template <int dim>
+void write_state(const std::filesystem::path &file, const SavedState<dim> &saved) {
   const Quiet quiet;
   std::filesystem::path unfinished = file;
   unfinished += ".part";
@@ -237,10 +242,15 @@ void write_state(const std::filesystem::path &file, const SavedState &saved) {
   check(!error, "{}: cannot be replaced: {}", file.string(), error.message());
 }
 
-SavedState read_state(const std::filesystem::path &file) {
+template <int dim> SavedState<dim> read_state(const std::filesystem::path &file) {
   const Quiet quiet;
   check(std::filesystem::exists(file), "{}: there is no such file", file.string());
-  return Reader(file).read();
+  return Reader(file).read<dim>();
 }
+
+template void write_state(const std::filesystem::path &, const SavedState<2> &);
+template SavedState<2> read_state(const std::filesystem::path &);
+template void write_state(const std::filesystem::path &, const SavedState<3> &);
+template SavedState<3> read_state(const std::filesystem::path &);
 
 } // namespace sluice::fluid

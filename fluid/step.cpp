@@ -10,14 +10,15 @@
 
 namespace sluice::fluid {
 
-FluidSolver::FluidSolver(const Scene &scene)
+template <int dim>
+FluidSolver<dim>::FluidSolver(const Scene<dim> &scene)
     : state(scene.initial), walls(scene.walls), params_(scene.params) {
   pressure_params_.density = params_.density;
   pressure_params_.row_guard = params_.row_guard;
-  nodal_forces_.assign(walls.position.size(), Vec<2>::Zero());
+  nodal_forces_.assign(walls.position.size(), Vec<dim>::Zero());
 }
 
-void FluidSolver::begin_step(double dt) {
+template <int dim> void FluidSolver<dim>::begin_step(double dt) {
   dt_ = dt;
   report_ = {};
   timer("move", [&] { move_points(state.points, dt, state.step_size); });
@@ -26,8 +27,8 @@ void FluidSolver::begin_step(double dt) {
   assemble();
 }
 
-void FluidSolver::iterate() {
-  Points &points = state.points;
+template <int dim> void FluidSolver<dim>::iterate() {
+  Points<dim> &points = state.points;
   set_wall_velocity(walls, cloud_, pressure_params_, dt_, problem_);
   const SolveResult result = timer("pressure solve", [&] {
     SolveOptions options;
@@ -48,17 +49,16 @@ void FluidSolver::iterate() {
   });
 }
 
-void FluidSolver::end_step() {
-  Points &points = state.points;
+template <int dim> void FluidSolver<dim>::end_step() {
+  Points<dim> &points = state.points;
   timer("project", [&] {
     const double factor = dt_ / params_.density;
     for_each_point(points.size(), [&](int i) {
       points.previous_velocity[i] = points.velocity[i];
-      points.velocity[i] = predicted_[i] - factor * pressure_gradient(i, points, cloud_, problem_,
-                                                                      points.pressure);
+      points.velocity[i] =
+          predicted_[i] - factor * pressure_gradient(i, points, cloud_, problem_, points.pressure);
     });
-    const double rate = params_.noise_damping *
-                        std::sqrt(params_.gravity.norm() / params_.spacing);
+    const double rate = params_.noise_damping * std::sqrt(params_.gravity.norm() / params_.spacing);
     damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient, rate, dt_,
                      points.velocity);
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
@@ -69,7 +69,16 @@ void FluidSolver::end_step() {
 
 namespace {
 
-void remove_points(Points &points, const std::vector<char> &leaves) {
+// Water may leave the scene upwards, and fall back.
+template <int dim>
+bool is_outside(const Vec<dim> &x, const Vec<dim> &low, const Vec<dim> &high, double margin) {
+  for (int d = 0; d < dim; ++d)
+    if (x[d] < low[d] - margin || (d != 1 && x[d] > high[d] + margin))
+      return true;
+  return false;
+}
+
+template <int dim> void remove_points(Points<dim> &points, const std::vector<char> &leaves) {
   const auto compact = [&](const char *, auto &values) {
     std::size_t n = 0;
     for (std::size_t i = 0; i < values.size(); ++i)
@@ -82,33 +91,37 @@ void remove_points(Points &points, const std::vector<char> &leaves) {
 
 } // namespace
 
-double FluidSolver::energy_of_point(const Vec<2> &u, const Vec<2> &x) const {
-  const double mass = params_.density * params_.spacing * params_.spacing;
-  return mass * (0.5 * u.squaredNorm() - params_.gravity.dot(x));
+template <int dim> double FluidSolver<dim>::mass_of_point() const {
+  double mass = params_.density;
+  for (int d = 0; d < dim; ++d)
+    mass *= params_.spacing;
+  return mass;
 }
 
-void FluidSolver::leave_through_outlet() {
-  Points &points = state.points;
-  Vec<2> low = walls.position.front(), high = low;
-  for (const Vec<2> &x : walls.position) {
+template <int dim>
+double FluidSolver<dim>::energy_of_point(const Vec<dim> &u, const Vec<dim> &x) const {
+  return mass_of_point() * (0.5 * u.squaredNorm() - params_.gravity.dot(x));
+}
+
+template <int dim> void FluidSolver<dim>::leave_through_outlet() {
+  Points<dim> &points = state.points;
+  Vec<dim> low = walls.position.front(), high = low;
+  for (const Vec<dim> &x : walls.position) {
     low = low.cwiseMin(x);
     high = high.cwiseMax(x);
   }
-  const double margin = params_.spacing;
   std::vector<char> leaves(points.size(), 0);
   bool any = false;
   for (int i = 0; i < points.size(); ++i) {
-    const Vec<2> &x = points.position[i];
+    const Vec<dim> &x = points.position[i];
     const bool is_out = x.x() > params_.outlet_x;
-    const bool is_lost = !is_out && (x.x() < low.x() - margin || x.x() > high.x() + margin ||
-                                     x.y() < low.y() - margin);
+    const bool is_lost = !is_out && is_outside(x, low, high, params_.spacing);
     state.outflow_points += is_out;
     state.lost_points += is_lost;
     leaves[i] = is_out || is_lost;
     if (leaves[i]) {
       state.outlet_energy += energy_of_point(points.velocity[i], x);
-      state.outlet_momentum +=
-          params_.density * params_.spacing * params_.spacing * points.velocity[i];
+      state.outlet_momentum += mass_of_point() * points.velocity[i];
     }
     any = any || leaves[i];
   }
@@ -120,16 +133,15 @@ void FluidSolver::leave_through_outlet() {
         state.step + 1, state.outflow_points, state.lost_points);
 }
 
-void FluidSolver::freeze_cloud() {
-  Points &points = state.points;
+template <int dim> void FluidSolver<dim>::freeze_cloud() {
+  Points<dim> &points = state.points;
   timer("walls", [&] {
     cloud_.spacing = params_.spacing;
     leave_through_outlet();
     update_walls(points, walls, params_.spacing, cloud_);
-    const ContactCounts contacts = keep_clear_of_walls(points, walls, params_.motion, cloud_);
+    const ContactCounts<dim> contacts = keep_clear_of_walls(points, walls, params_.motion, cloud_);
     state.wall_returns += contacts.put_back;
-    report_.contact_impulse =
-        params_.density * params_.spacing * params_.spacing * contacts.velocity_change;
+    report_.contact_impulse = mass_of_point() * contacts.velocity_change;
     if (contacts.moved > 0)
       update_walls(points, walls, params_.spacing, cloud_);
   });
@@ -137,18 +149,18 @@ void FluidSolver::freeze_cloud() {
   timer("cells", [&] { update_cells(points, cloud_); });
 }
 
-void FluidSolver::predict_velocity() {
-  Points &points = state.points;
+template <int dim> void FluidSolver<dim>::predict_velocity() {
+  Points<dim> &points = state.points;
   const double nu = params_.viscosity / params_.density;
   predicted_.assign(points.velocity.begin(), points.velocity.end());
   if (nu > 0)
-    report_.viscous_iterations = diffuse_velocity(points, walls, cloud_, nu, dt_, predicted_,
-                                                  viscous_, memory_);
+    report_.viscous_iterations =
+        diffuse_velocity(points, walls, cloud_, nu, dt_, predicted_, viscous_, memory_);
   for_each_point(points.size(), [&](int i) { predicted_[i] += dt_ * params_.gravity; });
 }
 
-void FluidSolver::assemble() {
-  Points &points = state.points;
+template <int dim> void FluidSolver<dim>::assemble() {
+  Points<dim> &points = state.points;
   timer("operators", [&] {
     target_divergence_.resize(points.size());
     volume_restoring_divergence(points, cloud_, params_.motion, params_.gravity.norm(),
@@ -157,22 +169,25 @@ void FluidSolver::assemble() {
                       problem_);
     report_.rows = problem_.rows;
     if (state.step > 0) // the first step has no pressure to judge by
-      report_.released =
-        release_tension(points, walls, pressure_params_, predicted_, target_divergence_, dt_,
-                        cloud_, problem_);
+      report_.released = release_tension(points, walls, pressure_params_, predicted_,
+                                         target_divergence_, dt_, cloud_, problem_);
   });
   timer("pressure set-up", [&] {
     std::vector<Cell> cells(points.size());
     for_each_point(points.size(), [&](int i) {
-      const Vec<2> c = (points.position[i] - cloud_.grid.origin) / (2 * cloud_.spacing);
-      cells[i] = {static_cast<int>(c.x()), static_cast<int>(c.y())};
+      const Vec<dim> c = (points.position[i] - cloud_.grid.origin) / (2 * cloud_.spacing);
+      cells[i] = {};
+      for (int d = 0; d < dim; ++d)
+        cells[i][d] = static_cast<int>(c[d]);
     });
     scaled_.build(problem_.matrix);
     multigrid_.build(scaled_, cells);
   });
-  timer("loads", [&] {
-    build_wall_quadrature(points, walls, cloud_, WallPart::coupled, quadrature_);
-  });
+  timer("loads",
+        [&] { build_wall_quadrature(points, walls, cloud_, WallPart::coupled, quadrature_); });
 }
+
+template class FluidSolver<2>;
+template class FluidSolver<3>;
 
 } // namespace sluice::fluid

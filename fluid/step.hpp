@@ -18,21 +18,21 @@
 namespace sluice::fluid {
 
 /// Work of one step, for the run report.
-struct StepReport {
+template <int dim> struct StepReport {
   RowCounts rows;
-  int pressure_iterations = 0;  // over all coupling iterations of the step
+  int pressure_iterations = 0; // over all coupling iterations of the step
   int viscous_iterations = 0;
   int pressure_solves = 0;
-  Vec<2> contact_impulse{0, 0}; // of walls on the points that touched them [N s/m]
-  int released = 0;             // points that bear no tension next to air
+  Vec<dim> contact_impulse = Vec<dim>::Zero(); // of walls on the points that touched them [N s/m]
+  int released = 0;                            // points that bear no tension next to air
 };
 
-class FluidSolver {
+template <int dim> class FluidSolver {
 public:
-  explicit FluidSolver(const Scene &scene);
+  explicit FluidSolver(const Scene<dim> &scene);
 
-  FluidState state; // a value: copy it to keep a checkpoint
-  Walls walls;      // move coupled vertices through here
+  FluidState<dim> state; // a value: copy it to keep a checkpoint
+  Walls<dim> walls;      // move coupled vertices through here
 
   /// Moves the points, freezes the cloud at walls.position, assembles viscosity and pressure.
   void begin_step(double dt);
@@ -41,13 +41,15 @@ public:
   /// Velocity after the pressure; plans the regularisation of the next move.
   void end_step();
 
-  const std::vector<Vec<2>> &nodal_forces() const { return nodal_forces_; } // per wall vertex [N/m]
-  const std::vector<Vec<2>> &tractions() const { return tractions_; }       // per coupled sample
-  const WallQuadrature &quadrature() const { return quadrature_; }
-  const Cloud &cloud() const { return cloud_; }
-  const PressureProblem &problem() const { return problem_; }
-  const StepReport &report() const { return report_; }
-  const FluidParams &params() const { return params_; }
+  const std::vector<Vec<dim>> &nodal_forces() const {
+    return nodal_forces_;
+  }                                                                     // per wall vertex [N/m]
+  const std::vector<Vec<dim>> &tractions() const { return tractions_; } // per coupled sample
+  const WallQuadrature<dim> &quadrature() const { return quadrature_; }
+  const Cloud<dim> &cloud() const { return cloud_; }
+  const PressureProblem<dim> &problem() const { return problem_; }
+  const StepReport<dim> &report() const { return report_; }
+  const FluidParams<dim> &params() const { return params_; }
   double dt() const { return dt_; }
   /// Energy that points have carried out of the scene so far [J/m].
   double outlet_energy() const { return state.outlet_energy; }
@@ -55,25 +57,26 @@ public:
 
 private:
   void leave_through_outlet();
-  double energy_of_point(const Vec<2> &u, const Vec<2> &x) const;
+  double mass_of_point() const;
+  double energy_of_point(const Vec<dim> &u, const Vec<dim> &x) const;
   void freeze_cloud();
   void predict_velocity();
   void assemble();
 
-  FluidParams params_;
+  FluidParams<dim> params_;
   PressureParams pressure_params_;
   double dt_ = 0;
-  Cloud cloud_;
-  PressureProblem problem_;
-  ViscousProblem viscous_;
-  std::vector<Vec<2>> predicted_; // u* [m/s]
+  Cloud<dim> cloud_;
+  PressureProblem<dim> problem_;
+  ViscousProblem<dim> viscous_;
+  std::vector<Vec<dim>> predicted_; // u* [m/s]
   std::vector<double> target_divergence_;
   ScaledMatrix scaled_;
   Multigrid multigrid_;
   KrylovMemory memory_;
-  WallQuadrature quadrature_;
-  std::vector<Vec<2>> tractions_, nodal_forces_;
-  StepReport report_;
+  WallQuadrature<dim> quadrature_;
+  std::vector<Vec<dim>> tractions_, nodal_forces_;
+  StepReport<dim> report_;
 };
 
 } // namespace sluice::fluid

@@ -21,29 +21,25 @@ double wet_fraction(double nearest, double spacing) {
   return std::clamp((dry_distance - nearest / spacing) / (dry_distance - wet_distance), 0.0, 1.0);
 }
 
-class QuadratureBuilder {
+template <int dim> class QuadratureBuilder {
 public:
-  QuadratureBuilder(const Points &points, const Walls &walls, const Cloud &cloud,
-                    WallQuadrature &quadrature)
+  QuadratureBuilder(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud,
+                    WallQuadrature<dim> &quadrature)
       : points_(points), walls_(walls), cloud_(cloud), quadrature_(quadrature) {}
 
-  // Two Gauss points on pieces no longer than a spacing: exact for linear pressure times shape.
-  void add_segment(int k) {
-    const WallSegment &s = walls_.segments[k];
-    const Vec<2> &a = walls_.position[s.a], &b = walls_.position[s.b];
-    const double length = (b - a).norm();
-    const int pieces = std::max(1, static_cast<int>(std::ceil(length / cloud_.spacing)));
-    const double gauss = 0.5 / std::sqrt(3.0);
-    for (int piece = 0; piece < pieces; ++piece)
-      for (const double offset : {-gauss, gauss})
-        add_sample(k, (piece + 0.5 + offset) / pieces, 0.5 * length / pieces);
+  // Pieces no longer than a spacing; exact for linear pressure times shape.
+  void add_face(int k) {
+    const Corners<dim> corners = walls_.corners(walls_.faces[k]);
+    for_each_quadrature_point(
+        corners, cloud_.spacing,
+        [&](const Shape<dim> &shape, double measure) { add_sample(k, shape, measure); });
   }
 
 private:
-  void add_sample(int k, double t, double length) {
-    const WallSegment &s = walls_.segments[k];
-    const Vec<2> x = (1 - t) * walls_.position[s.a] + t * walls_.position[s.b];
-    const Vec<2> inward = walls_.normal(s);
+  void add_sample(int k, const Shape<dim> &shape, double measure) {
+    const WallFace<dim> &face = walls_.faces[k];
+    const Vec<dim> x = value_at<dim>(walls_.position, face, shape);
+    const Vec<dim> inward = walls_.normal(face);
     const int first = static_cast<int>(quadrature_.contributions.size());
     const double nearest = collect(x, inward);
     const int count = static_cast<int>(quadrature_.contributions.size()) - first;
@@ -53,15 +49,15 @@ private:
       return;
     }
     normalise(first);
-    quadrature_.samples.push_back({k, t, x, Vec<2>(-inward), wet * length, first, count});
+    quadrature_.samples.push_back({k, shape, x, Vec<dim>(-inward), wet * measure, first, count});
   }
 
-  // Adds the points in front of the segment and in sight; returns the distance of the nearest.
-  double collect(const Vec<2> &x, const Vec<2> &inward) {
+  // Adds the points in front of the face and in sight; returns the distance of the nearest.
+  double collect(const Vec<dim> &x, const Vec<dim> &inward) {
     const double radius = load_radius * cloud_.spacing;
     double nearest = 1e300;
     for_each_point_near(x, [&](int i) {
-      const Vec<2> r = points_.position[i] - x;
+      const Vec<dim> r = points_.position[i] - x;
       const double distance = r.norm();
       if (distance >= radius || r.dot(inward) <= 0 || is_behind_another_wall(x, inward, i))
         return;
@@ -71,28 +67,25 @@ private:
     return nearest;
   }
 
-  bool is_behind_another_wall(const Vec<2> &x, const Vec<2> &inward, int i) const {
-    const PointWalls *near = cloud_.walls_of(i);
+  bool is_behind_another_wall(const Vec<dim> &x, const Vec<dim> &inward, int i) const {
+    const PointWalls<dim> *near = cloud_.walls_of(i);
     if (!near || near->count == 0)
       return false;
-    const auto candidates = cloud_.near_segments.near(cloud_.grid.cell(points_.position[i]));
+    const auto candidates = cloud_.near_faces.near(cloud_.grid.cell(points_.position[i]));
     const double off_wall = 1e-6 * cloud_.spacing;
-    return is_hidden(walls_, candidates, x + off_wall * inward, points_.position[i]);
+    return is_hidden<dim>(walls_, candidates, x + off_wall * inward, points_.position[i]);
   }
 
-  template <class Visit> void for_each_point_near(const Vec<2> &x, Visit &&visit) const {
-    const Grid &grid = cloud_.grid;
+  template <class Visit> void for_each_point_near(const Vec<dim> &x, Visit &&visit) const {
+    const Grid<dim> &grid = cloud_.grid;
     const double reach = load_radius * cloud_.spacing;
-    const Vec<2> low = x.array() - reach, high = x.array() + reach;
-    const Vec<2> top = grid.origin + grid.cell_size * Vec<2>(grid.nx, grid.ny);
-    if ((high.array() < grid.origin.array()).any() || (low.array() > top.array()).any())
+    const Vec<dim> low = x.array() - reach, high = x.array() + reach;
+    if ((high.array() < grid.origin.array()).any() || (low.array() > grid.top().array()).any())
       return;
-    for (int y = grid.row(low.y()); y <= grid.row(high.y()); ++y) {
-      const int first = cloud_.ranges.start[y * grid.nx + grid.column(low.x())];
-      const int last = cloud_.ranges.start[y * grid.nx + grid.column(high.x()) + 1];
-      for (int i = first; i < last; ++i)
+    grid.for_each_run(grid.place(low), grid.place(high), [&](int first, int last) {
+      for (int i = cloud_.ranges.start[first]; i < cloud_.ranges.start[last + 1]; ++i)
         visit(i);
-    }
+    });
   }
 
   void normalise(int first) {
@@ -103,10 +96,10 @@ private:
       c->weight /= total;
   }
 
-  const Points &points_;
-  const Walls &walls_;
-  const Cloud &cloud_;
-  WallQuadrature &quadrature_;
+  const Points<dim> &points_;
+  const Walls<dim> &walls_;
+  const Cloud<dim> &cloud_;
+  WallQuadrature<dim> &quadrature_;
 };
 
 } // namespace
@@ -114,10 +107,10 @@ private:
 namespace {
 
 // From point numbers to feeder numbers.
-void number_feeders(int n_points, WallQuadrature &quadrature) {
+template <int dim> void number_feeders(int n_points, WallQuadrature<dim> &quadrature) {
   quadrature.feeders.clear();
   quadrature.feeder_of_point.assign(n_points, -1);
-  for (WallQuadrature::Contribution &c : quadrature.contributions) {
+  for (typename WallQuadrature<dim>::Contribution &c : quadrature.contributions) {
     int &feeder = quadrature.feeder_of_point[c.feeder];
     if (feeder < 0) {
       feeder = static_cast<int>(quadrature.feeders.size());
@@ -129,69 +122,88 @@ void number_feeders(int n_points, WallQuadrature &quadrature) {
 
 } // namespace
 
-void build_wall_quadrature(const Points &points, const Walls &walls, const Cloud &cloud,
-                           WallPart part, WallQuadrature &quadrature) {
+template <int dim>
+void build_wall_quadrature(const Points<dim> &points, const Walls<dim> &walls,
+                           const Cloud<dim> &cloud, WallPart part,
+                           WallQuadrature<dim> &quadrature) {
   quadrature.samples.clear();
   quadrature.contributions.clear();
-  QuadratureBuilder builder(points, walls, cloud, quadrature);
+  QuadratureBuilder<dim> builder(points, walls, cloud, quadrature);
   if (part == WallPart::coupled)
-    for (const int k : walls.coupled_segments)
-      builder.add_segment(k);
+    for (const int k : walls.coupled_faces)
+      builder.add_face(k);
   else
-    for (int k = 0; k < static_cast<int>(walls.segments.size()); ++k)
-      builder.add_segment(k);
+    for (int k = 0; k < static_cast<int>(walls.faces.size()); ++k)
+      builder.add_face(k);
   number_feeders(points.size(), quadrature);
 }
 
-void evaluate_tractions(const Points &points, const Walls &walls, const Cloud &cloud,
-                        const PressureProblem &problem, std::span<const double> pressure,
-                        double viscosity, const WallQuadrature &quadrature,
-                        std::vector<Vec<2>> &traction) {
-  std::vector<Vec<2>> gradient(quadrature.feeders.size());
+template <int dim>
+void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud,
+                        const PressureProblem<dim> &problem, std::span<const double> pressure,
+                        double viscosity, const WallQuadrature<dim> &quadrature,
+                        std::vector<Vec<dim>> &traction) {
+  std::vector<Vec<dim>> gradient(quadrature.feeders.size());
   for_each_index(static_cast<int>(gradient.size()), [&](int f) {
     gradient[f] = pressure_gradient(quadrature.feeders[f], points, cloud, problem, pressure);
   });
   traction.resize(quadrature.samples.size());
   for_each_index(static_cast<int>(traction.size()), [&](int k) {
-    const WallQuadrature::Sample &s = quadrature.samples[k];
-    const WallSegment &segment = walls.segments[s.segment];
-    const Vec<2> wall_velocity =
-        (1 - s.t) * walls.velocity[segment.a] + s.t * walls.velocity[segment.b];
+    const typename WallQuadrature<dim>::Sample &s = quadrature.samples[k];
+    const Vec<dim> wall_velocity = value_at<dim>(walls.velocity, walls.faces[s.face], s.shape);
+    const double face_viscosity = walls.slips(s.face) ? 0.0 : viscosity;
     double p = 0;
-    Vec<2> shear = Vec<2>::Zero();
+    Vec<dim> shear = Vec<dim>::Zero();
     for (int c = s.first; c < s.first + s.count; ++c) {
       const auto &[feeder, w] = quadrature.contributions[c];
       const int i = quadrature.feeders[feeder];
-      const Vec<2> r = s.position - points.position[i];
+      const Vec<dim> r = s.position - points.position[i];
       p += w * (pressure[i] + gradient[feeder].dot(r));
-      const Vec<2> slip = points.velocity[i] - wall_velocity;
+      const Vec<dim> slip = points.velocity[i] - wall_velocity;
       const double distance = std::max(r.dot(s.normal), 0.25 * cloud.spacing);
-      shear += w * viscosity / distance * (slip - slip.dot(s.normal) * s.normal);
+      shear += w * face_viscosity / distance * (slip - slip.dot(s.normal) * s.normal);
     }
     traction[k] = p * s.normal + shear;
   });
 }
 
-void integrate_nodal_forces(const Walls &walls, const WallQuadrature &quadrature,
-                            std::span<const Vec<2>> traction, std::span<Vec<2>> force) {
-  std::fill(force.begin(), force.end(), Vec<2>(Vec<2>::Zero()));
+template <int dim>
+void integrate_nodal_forces(const Walls<dim> &walls, const WallQuadrature<dim> &quadrature,
+                            VecView<dim> traction, VecSpan<dim> force) {
+  std::fill(force.begin(), force.end(), Vec<dim>(Vec<dim>::Zero()));
   for (std::size_t k = 0; k < quadrature.samples.size(); ++k) {
-    const WallQuadrature::Sample &s = quadrature.samples[k];
-    const WallSegment &segment = walls.segments[s.segment];
-    force[segment.a] += (1 - s.t) * s.length * traction[k];
-    force[segment.b] += s.t * s.length * traction[k];
+    const typename WallQuadrature<dim>::Sample &s = quadrature.samples[k];
+    for (int c = 0; c < dim; ++c)
+      force[walls.faces[s.face].vertex[c]] += s.shape[c] * s.measure * traction[k];
   }
 }
 
-Resultant integrate_resultant(const WallQuadrature &quadrature,
-                              std::span<const Vec<2>> traction) {
-  Resultant total;
+template <int dim>
+Resultant<dim> integrate_resultant(const WallQuadrature<dim> &quadrature, VecView<dim> traction) {
+  Resultant<dim> total;
   for (std::size_t k = 0; k < quadrature.samples.size(); ++k) {
-    const Vec<2> force = quadrature.samples[k].length * traction[k];
+    const Vec<dim> force = quadrature.samples[k].measure * traction[k];
     total.force += force;
     total.moment += cross(quadrature.samples[k].position, force);
   }
   return total;
 }
+
+template void build_wall_quadrature(const Points<2> &, const Walls<2> &, const Cloud<2> &, WallPart,
+                                    WallQuadrature<2> &);
+template void evaluate_tractions(const Points<2> &, const Walls<2> &, const Cloud<2> &,
+                                 const PressureProblem<2> &, std::span<const double>, double,
+                                 const WallQuadrature<2> &, std::vector<Vec<2>> &);
+template void integrate_nodal_forces(const Walls<2> &, const WallQuadrature<2> &, VecView<2>,
+                                     VecSpan<2>);
+template Resultant<2> integrate_resultant(const WallQuadrature<2> &, VecView<2>);
+template void build_wall_quadrature(const Points<3> &, const Walls<3> &, const Cloud<3> &, WallPart,
+                                    WallQuadrature<3> &);
+template void evaluate_tractions(const Points<3> &, const Walls<3> &, const Cloud<3> &,
+                                 const PressureProblem<3> &, std::span<const double>, double,
+                                 const WallQuadrature<3> &, std::vector<Vec<3>> &);
+template void integrate_nodal_forces(const Walls<3> &, const WallQuadrature<3> &, VecView<3>,
+                                     VecSpan<3>);
+template Resultant<3> integrate_resultant(const WallQuadrature<3> &, VecView<3>);
 
 } // namespace sluice::fluid

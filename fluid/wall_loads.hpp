@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Traction of the fluid on the walls, integrated into nodal forces. At each quadrature point of a
-// segment the pressure is a positive average of first-order Taylor expansions from the points in
+// face the pressure is a positive average of first-order Taylor expansions from the points in
 // sight on the wetted side, p(x) = sum w_i (p_i + grad p_i . (x - x_i)): exact for linear pressure,
 // and affine in the wall velocity. Faces are one-sided; nothing is averaged round a corner.
 #pragma once
@@ -13,14 +13,14 @@
 namespace sluice::fluid {
 
 /// Quadrature points on the wetted walls of a frozen cloud and the fluid points that feed them.
-struct WallQuadrature {
+template <int dim> struct WallQuadrature {
   struct Sample {
-    int segment;
-    double t;        // on the segment, 0 at vertex a
-    Vec<2> position; // [m]
-    Vec<2> normal;   // unit, out of the fluid
-    double length;   // quadrature weight times wetted fraction [m]
-    int first, count; // contributions
+    int face;
+    Shape<dim> shape;  // of the face's vertices
+    Vec<dim> position; // [m]
+    Vec<dim> normal;   // unit, out of the fluid
+    double measure;    // quadrature weight times wetted fraction [m^(dim-1)]
+    int first, count;  // contributions
   };
   struct Contribution {
     int feeder;
@@ -32,30 +32,35 @@ struct WallQuadrature {
   std::vector<int> feeder_of_point;        // -1: none
 };
 
-/// Resultant on part of the walls [N/m, N] per metre of depth, moment about the origin.
-struct Resultant {
-  Vec<2> force{0, 0};
-  double moment = 0;
+/// Resultant on part of the walls [N, N m], in the plane per metre of depth; moment about the
+/// origin.
+template <int dim> struct Resultant {
+  Vec<dim> force = Vec<dim>::Zero();
+  decltype(cross(force, force)) moment = cross(force, force); // a number in the plane
 };
 
 enum class WallPart { coupled, all };
 
-/// Finds the wetted quadrature points of the coupled segments, or of all.
-void build_wall_quadrature(const Points &points, const Walls &walls, const Cloud &cloud,
-                           WallPart part, WallQuadrature &quadrature);
+/// Finds the wetted quadrature points of the coupled faces, or of all.
+template <int dim>
+void build_wall_quadrature(const Points<dim> &points, const Walls<dim> &walls,
+                           const Cloud<dim> &cloud, WallPart part, WallQuadrature<dim> &quadrature);
 
 /// Tractions at the samples [Pa]: pressure times the normal, and viscous shear with the tangential
-/// velocity difference to the wall over the distance.
-void evaluate_tractions(const Points &points, const Walls &walls, const Cloud &cloud,
-                        const PressureProblem &problem, std::span<const double> pressure,
-                        double viscosity, const WallQuadrature &quadrature,
-                        std::vector<Vec<2>> &traction);
+/// velocity difference to the wall over the distance, unless the wall slips.
+template <int dim>
+void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud,
+                        const PressureProblem<dim> &problem, std::span<const double> pressure,
+                        double viscosity, const WallQuadrature<dim> &quadrature,
+                        std::vector<Vec<dim>> &traction);
 
 /// Consistent nodal forces [N/m] on all wall vertices: sum of traction times linear shape function.
-void integrate_nodal_forces(const Walls &walls, const WallQuadrature &quadrature,
-                            std::span<const Vec<2>> traction, std::span<Vec<2>> force);
+template <int dim>
+void integrate_nodal_forces(const Walls<dim> &walls, const WallQuadrature<dim> &quadrature,
+                            VecView<dim> traction, VecSpan<dim> force);
 
 /// Resultant of the tractions themselves.
-Resultant integrate_resultant(const WallQuadrature &quadrature, std::span<const Vec<2>> traction);
+template <int dim>
+Resultant<dim> integrate_resultant(const WallQuadrature<dim> &quadrature, VecView<dim> traction);
 
 } // namespace sluice::fluid

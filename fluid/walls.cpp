@@ -2,77 +2,152 @@
 #include "fluid/walls.hpp"
 
 #include "bridge/base/check.hpp"
+#include "fluid/coordinates.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 namespace sluice::fluid {
+
+template <int dim> Corners<dim> Walls<dim>::corners(const WallFace<dim> &f) const {
+  if constexpr (dim == 2)
+    return {position[f.vertex[0]], position[f.vertex[1]]};
+  else
+    return {position[f.vertex[0]], position[f.vertex[1]], position[f.vertex[2]]};
+}
 
 namespace {
 
 constexpr double cos_30_degrees = 0.866;
 
-struct Foot {
-  Vec<2> point;
-  double t;
-};
-
-Foot nearest_on_segment(const Vec<2> &a, const Vec<2> &b, const Vec<2> &x) {
-  const Vec<2> e = b - a;
-  const double t = std::clamp((x - a).dot(e) / e.squaredNorm(), 0.0, 1.0);
-  return {a + t * e, t};
+template <int dim> Foot<dim> foot_on(const Walls<dim> &walls, int face, const Vec<dim> &x) {
+  return nearest_on_face(walls.corners(walls.faces[face]), x);
 }
 
-Foot foot_on(const Walls &walls, int segment, const Vec<2> &x) {
-  const WallSegment &s = walls.segments[segment];
-  return nearest_on_segment(walls.position[s.a], walls.position[s.b], x);
+std::span<const int> faces_around(const Walls<3> &walls, int vertex) {
+  return {walls.around.data() + walls.around_start[vertex],
+          walls.around.data() + walls.around_start[vertex + 1]};
 }
 
-// A foot is a local minimum of the distance along the outline unless it is a vertex from which
-// the neighbouring segment comes nearer. A shared vertex is reported by the segment that ends in it.
-bool is_local_minimum(const Walls &walls, int segment, const Foot &foot, const Vec<2> &x) {
-  const WallSegment &s = walls.segments[segment];
-  if (foot.t > 0 && foot.t < 1)
-    return true;
-  if (foot.t >= 1)
-    return s.next < 0 || foot_on(walls, s.next, x).t <= 0;
-  return s.previous < 0;
+// --- a place that several faces share -----------------------------------------------------------
+
+// It is reported by one of them: a side by the segment that ends in it, or the first of two
+// triangles.
+template <int dim> bool owns_side(const Walls<dim> &walls, int face, int side) {
+  const int other = walls.faces[face].beyond[side];
+  return other < 0 || (dim == 2 ? side == 1 : face < other);
 }
 
-// Side of the wall at a foot: the segment's normal inside it, the mean normal at a shared vertex.
-Vec<2> fluid_side(const Walls &walls, int segment, const Foot &foot) {
-  const WallSegment &s = walls.segments[segment];
-  if (foot.t >= 1 && s.next >= 0)
-    return walls.normal(s) + walls.normal(walls.segments[s.next]);
-  return walls.normal(s);
+template <int dim> int side_towards(const WallFace<dim> &face, int other) {
+  return static_cast<int>(std::find(face.beyond.begin(), face.beyond.end(), other) -
+                          face.beyond.begin());
 }
 
-bool is_sharp_edge(const Walls &walls, int segment, const Foot &foot) {
-  const WallSegment &s = walls.segments[segment];
-  if (foot.t > 0 && foot.t < 1)
+// A foot is a local minimum of the distance over the surface unless it lies on a side or corner
+// from which a neighbouring face comes nearer.
+template <int dim>
+bool is_side_minimum(const Walls<dim> &walls, int face, int side, const Vec<dim> &x) {
+  const int other = walls.faces[face].beyond[side];
+  return other < 0 ||
+         foot_on(walls, other, x).part == FacePart::side(side_towards(walls.faces[other], face));
+}
+
+bool is_corner_minimum(const Walls<3> &walls, int face, const Foot<3> &foot, const Vec<3> &x) {
+  const auto around = faces_around(walls, walls.faces[face].vertex[foot.part.number()]);
+  if (around.front() != face) // the first reports it
     return false;
-  return foot.t <= 0 || s.next < 0 ||
-         walls.tangent(s).dot(walls.tangent(walls.segments[s.next])) < cos_30_degrees;
+  const double distance2 = (foot.point - x).squaredNorm();
+  return std::all_of(around.begin(), around.end(), [&](int other) {
+    return other == face || (foot_on(walls, other, x).point - x).squaredNorm() >= distance2;
+  });
 }
 
-Projection make_projection(const Walls &walls, int segment, const Foot &foot, const Vec<2> &x) {
-  const Vec<2> side = fluid_side(walls, segment, foot);
-  const Vec<2> offset = x - foot.point;
+template <int dim>
+bool is_local_minimum(const Walls<dim> &walls, int face, const Foot<dim> &foot, const Vec<dim> &x) {
+  if (foot.part.is_inside())
+    return true;
+  if (foot.part.is_side())
+    return owns_side(walls, face, foot.part.number()) &&
+           is_side_minimum(walls, face, foot.part.number(), x);
+  if constexpr (dim == 3)
+    return is_corner_minimum(walls, face, foot, x);
+  return false;
+}
+
+int corner_at(const Corners<3> &c, const Vec<3> &x) {
+  const auto distance2 = [&](int k) { return (c[k] - x).squaredNorm(); };
+  int nearest = 0;
+  for (int k = 1; k < 3; ++k)
+    nearest = distance2(k) < distance2(nearest) ? k : nearest;
+  return nearest;
+}
+
+// Sum of the normals of the faces around a corner, weighted by their angles there: tells the side
+// of any point whose foot it is. Source: J. A. Baerentzen, H. Aanaes, IEEE Trans. Vis. Comput.
+// Graph. 11 (2005) 243.
+Vec<3> corner_normal(const Walls<3> &walls, int vertex) {
+  Vec<3> sum = Vec<3>::Zero();
+  for (const int f : faces_around(walls, vertex)) {
+    const Corners<3> c = walls.corners(walls.faces[f]);
+    const int k = corner_at(c, walls.position[vertex]);
+    const Vec<3> e = c[(k + 1) % 3] - c[k], g = c[(k + 2) % 3] - c[k];
+    sum += std::atan2(cross(e, g).norm(), e.dot(g)) * face_normal(c);
+  }
+  return sum;
+}
+
+// Side of the wall at a foot: the face's normal inside it, the mean normal where faces meet.
+template <int dim> Vec<dim> fluid_side(const Walls<dim> &walls, int face, const Foot<dim> &foot) {
+  const WallFace<dim> &f = walls.faces[face];
+  if constexpr (dim == 3)
+    if (!foot.part.is_inside() && !foot.part.is_side())
+      return corner_normal(walls, f.vertex[foot.part.number()]);
+  if (foot.part.is_side() && f.beyond[foot.part.number()] >= 0)
+    return walls.normal(f) + walls.normal(walls.faces[f.beyond[foot.part.number()]]);
+  return walls.normal(f);
+}
+
+template <int dim> bool is_sharp_side(const Walls<dim> &walls, const WallFace<dim> &f, int side) {
+  const int other = f.beyond[side];
+  return other < 0 || walls.normal(f).dot(walls.normal(walls.faces[other])) < cos_30_degrees;
+}
+
+template <int dim> bool is_sharp(const Walls<dim> &walls, int face, const FacePart &part) {
+  if (part.is_inside())
+    return false;
+  if (part.is_side())
+    return is_sharp_side(walls, walls.faces[face], part.number());
+  if constexpr (dim == 3) {
+    const int vertex = walls.faces[face].vertex[part.number()];
+    for (const int f : faces_around(walls, vertex)) {
+      const WallFace<3> &other = walls.faces[f];
+      const int k = corner_at(walls.corners(other), walls.position[vertex]);
+      if (is_sharp_side(walls, other, k) || is_sharp_side(walls, other, (k + 2) % 3))
+        return true;
+    }
+  }
+  return false;
+}
+
+template <int dim>
+Projection<dim> make_projection(const Walls<dim> &walls, int face, const Foot<dim> &foot,
+                                const Vec<dim> &x) {
+  const Vec<dim> side = fluid_side(walls, face, foot);
+  const Vec<dim> offset = x - foot.point;
   const double length = offset.norm();
-  const bool at_vertex = foot.t <= 0 || foot.t >= 1;
   const double sign = offset.dot(side) >= 0 ? 1.0 : -1.0;
-  const Vec<2> normal = at_vertex && length > 1e-12
-                            ? Vec<2>(-sign * offset / length)
-                            : Vec<2>(-side.normalized());
-  return {foot.point, normal, sign * length, foot.t, segment,
-          is_sharp_edge(walls, segment, foot)};
+  const Vec<dim> normal = !foot.part.is_inside() && length > 1e-12
+                              ? Vec<dim>(-sign * offset / length)
+                              : Vec<dim>(-side.normalized());
+  return {foot.point, normal, sign * length, foot.shape, face, is_sharp(walls, face, foot.part)};
 }
 
 // Candidates of one point, nearest first: their order on the outlines has no influence.
-class NearestFirst {
+template <int dim> class NearestFirst {
 public:
-  void insert(const Projection &p) {
+  void insert(const Projection<dim> &p) {
     if (count_ == most && std::abs(p.distance) >= std::abs(all_[most - 1].distance))
       return;
     int k = count_ < most ? count_++ : most - 1;
@@ -81,10 +156,10 @@ public:
     all_[k] = p;
   }
   /// The nearest of each direction.
-  PointWalls by_direction() const {
-    PointWalls found;
+  PointWalls<dim> by_direction() const {
+    PointWalls<dim> found;
     for (int k = 0; k < count_ && found.count < static_cast<int>(found.projection.size()); ++k) {
-      const bool is_new = std::none_of(found.begin(), found.end(), [&](const Projection &p) {
+      const bool is_new = std::none_of(found.begin(), found.end(), [&](const Projection<dim> &p) {
         return p.normal.dot(all_[k].normal) > cos_30_degrees;
       });
       if (is_new)
@@ -94,19 +169,19 @@ public:
   }
 
 private:
-  static constexpr int most = 12;
+  static constexpr int most = 4 * most_projections<dim>;
   int count_ = 0;
-  std::array<Projection, most> all_;
+  std::array<Projection<dim>, most> all_;
 };
 
 // The far face of a plate is behind its near face: not a wall of this point.
-void drop_far_faces(PointWalls &found) {
+template <int dim> void drop_far_faces(PointWalls<dim> &found) {
   int kept = 0;
   for (int k = 0; k < found.count; ++k) {
-    const Projection &p = found.projection[k];
+    const Projection<dim> &p = found.projection[k];
     bool is_far_face = false;
     for (int m = 0; m < kept; ++m) {
-      const Projection &near = found.projection[m];
+      const Projection<dim> &near = found.projection[m];
       is_far_face = is_far_face || (p.distance < 0 && near.distance >= 0 &&
                                     near.normal.dot(p.point - near.point) > 0);
     }
@@ -118,136 +193,213 @@ void drop_far_faces(PointWalls &found) {
 
 } // namespace
 
-PointWalls project_on_walls(const Walls &walls, std::span<const int> candidates, const Vec<2> &x,
-                            double reach) {
-  NearestFirst nearest;
-  for (const int s : candidates) {
-    const Foot foot = foot_on(walls, s, x);
-    if ((x - foot.point).squaredNorm() > reach * reach || !is_local_minimum(walls, s, foot, x))
+template <int dim>
+PointWalls<dim> project_on_walls(const Walls<dim> &walls, std::span<const int> candidates,
+                                 const Vec<dim> &x, double reach) {
+  NearestFirst<dim> nearest;
+  for (const int f : candidates) {
+    const Foot<dim> foot = foot_on(walls, f, x);
+    if ((x - foot.point).squaredNorm() > reach * reach || !is_local_minimum(walls, f, foot, x))
       continue;
-    nearest.insert(make_projection(walls, s, foot, x));
+    nearest.insert(make_projection(walls, f, foot, x));
   }
-  PointWalls found = nearest.by_direction();
+  PointWalls<dim> found = nearest.by_direction();
   drop_far_faces(found);
   return found;
 }
 
-double distance_to_walls(const Walls &walls, const Vec<2> &x) {
+template <int dim> double distance_to_walls(const Walls<dim> &walls, const Vec<dim> &x) {
   double nearest = std::numeric_limits<double>::infinity();
-  for (int s = 0; s < static_cast<int>(walls.segments.size()); ++s)
-    nearest = std::min(nearest, (foot_on(walls, s, x).point - x).norm());
+  for (int f = 0; f < static_cast<int>(walls.faces.size()); ++f)
+    nearest = std::min(nearest, (foot_on(walls, f, x).point - x).norm());
   return nearest;
 }
 
-bool is_hidden(const Walls &walls, std::span<const int> candidates, const Vec<2> &from,
-               const Vec<2> &to) {
-  const Vec<2> path = to - from;
-  for (const int k : candidates) {
-    const WallSegment &s = walls.segments[k];
-    const Vec<2> a = walls.position[s.a] - from, b = walls.position[s.b] - from;
-    const double side_a = cross(path, a), side_b = cross(path, b);
-    if ((side_a > 0) == (side_b > 0))
-      continue;
-    const Vec<2> e = b - a;
-    const double start = cross(e, -a), end = cross(e, path - a);
-    if ((start > 0) != (end > 0))
-      return true;
-  }
-  return false;
+template <int dim>
+bool is_hidden(const Walls<dim> &walls, std::span<const int> candidates, const Vec<dim> &from,
+               const Vec<dim> &to) {
+  return std::any_of(candidates.begin(), candidates.end(),
+                     [&](int f) { return is_crossed(walls.corners(walls.faces[f]), from, to); });
 }
 
 namespace {
 
-// Calls visit(cell) for every cell that the segment may come within `reach` of.
-template <class Visit>
-void for_each_cell_near(const Walls &walls, const WallSegment &s, const Grid &grid, double reach,
-                        Visit &&visit) {
-  const Vec<2> &a = walls.position[s.a], &b = walls.position[s.b];
-  const Vec<2> low = a.cwiseMin(b).array() - reach, high = a.cwiseMax(b).array() + reach;
-  const Vec<2> top = grid.origin + grid.cell_size * Vec<2>(grid.nx, grid.ny);
-  if (high.x() < grid.origin.x() || high.y() < grid.origin.y() || low.x() > top.x() ||
-      low.y() > top.y())
+// Calls visit(cell) for every cell that the face may come within `reach` of.
+template <int dim, class Visit>
+void for_each_cell_near(const Walls<dim> &walls, const WallFace<dim> &f, const Grid<dim> &grid,
+                        double reach, Visit &&visit) {
+  const Corners<dim> corners = walls.corners(f);
+  Vec<dim> low = corners[0], high = corners[0];
+  for (const Vec<dim> &x : corners) {
+    low = low.cwiseMin(x);
+    high = high.cwiseMax(x);
+  }
+  low.array() -= reach;
+  high.array() += reach;
+  if ((high.array() < grid.origin.array()).any() || (low.array() > grid.top().array()).any())
     return;
-  const double limit = reach + 0.7072 * grid.cell_size;
-  for (int y = grid.row(low.y()); y <= grid.row(high.y()); ++y)
-    for (int x = grid.column(low.x()); x <= grid.column(high.x()); ++x) {
-      const Vec<2> centre = grid.origin + grid.cell_size * Vec<2>(x + 0.5, y + 0.5);
-      if ((nearest_on_segment(a, b, centre).point - centre).squaredNorm() <= limit * limit)
-        visit(y * grid.nx + x);
+  const double limit = reach + (dim == 2 ? 0.7072 : 0.8661) * grid.cell_size; // half a diagonal
+  const auto first = grid.place(low), last = grid.place(high);
+  grid.for_each_run(first, last, [&](int begin, int end) {
+    for (int c = begin; c <= end; ++c) {
+      const Vec<dim> centre = grid.centre(c);
+      if ((nearest_on_face(corners, centre).point - centre).squaredNorm() <= limit * limit)
+        visit(c);
     }
+  });
 }
 
 } // namespace
 
-void find_near_segments(const Walls &walls, const Grid &grid, double reach, SegmentGrid &near) {
+template <int dim>
+void find_near_faces(const Walls<dim> &walls, const Grid<dim> &grid, double reach, FaceGrid &near) {
   near.start.assign(grid.n_cells() + 1, 0);
-  for (const WallSegment &s : walls.segments)
-    for_each_cell_near(walls, s, grid, reach, [&](int c) { ++near.start[c + 1]; });
+  for (const WallFace<dim> &f : walls.faces)
+    for_each_cell_near(walls, f, grid, reach, [&](int c) { ++near.start[c + 1]; });
   for (int c = 0; c < grid.n_cells(); ++c)
     near.start[c + 1] += near.start[c];
-  near.segment.resize(near.start.back());
+  near.face.resize(near.start.back());
   std::vector<int> next(near.start.begin(), near.start.end() - 1);
-  for (int k = 0; k < static_cast<int>(walls.segments.size()); ++k)
-    for_each_cell_near(walls, walls.segments[k], grid, reach,
-                       [&](int c) { near.segment[next[c]++] = k; });
+  for (int k = 0; k < static_cast<int>(walls.faces.size()); ++k)
+    for_each_cell_near(walls, walls.faces[k], grid, reach,
+                       [&](int c) { near.face[next[c]++] = k; });
 }
 
-namespace {
-
-[[noreturn]] void refuse_opposed(const Walls &walls, const WallSegment &s, const WallSegment &t,
-                                 int vertex) {
-  const Vec<2> &x = walls.position[vertex];
-  fail("walls '{}' and '{}' run against each other at ({}, {}) m; reverse the points_m of one: the "
-       "fluid lies on the left of both",
-       walls.names[s.wall], walls.names[t.wall], x.x(), x.y());
-}
-
-} // namespace
+// --- links --------------------------------------------------------------------------------------
 
 namespace {
 
 // Vertices closer than this are one [m].
 constexpr double same_place = 1e-9;
 
-struct SegmentEnd {
-  Vec<2> place;
-  int segment;
-  bool is_start;
+// Numbers of the places of the vertices, equal for vertices at one place.
+template <int dim> std::vector<int> places_of_vertices(const Walls<dim> &walls) {
+  const int n = static_cast<int>(walls.position.size());
+  // Along a direction that no wall of a scene has by design: few vertices fall on one spot.
+  Vec<dim> direction;
+  if constexpr (dim == 2)
+    direction = {0.5403, 0.8415};
+  else
+    direction = {0.5403, 0.7081, 0.4546};
+  std::vector<int> order(n), place(n);
+  std::iota(order.begin(), order.end(), 0);
+  std::iota(place.begin(), place.end(), 0);
+  const auto along = [&](int v) { return direction.dot(walls.position[v]); };
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return along(a) < along(b); });
+  for (int k = 0; k < n; ++k)
+    for (int m = k + 1; m < n && along(order[m]) - along(order[k]) <= 1.01 * same_place; ++m)
+      if ((walls.position[order[m]] - walls.position[order[k]]).norm() < same_place)
+        place[order[m]] = place[order[k]];
+  return place;
+}
+
+template <int dim> struct Side {
+  std::array<int, dim - 1> place; // sorted
+  int face, number;
+  bool forward; // in which way the face runs along it: two faces must differ
 };
 
-void link(Walls &walls, const SegmentEnd &p, const SegmentEnd &q) {
-  WallSegment &s = walls.segments[p.segment], &t = walls.segments[q.segment];
-  if (p.is_start == q.is_start)
-    refuse_opposed(walls, s, t, p.is_start ? s.a : s.b);
-  WallSegment &from = p.is_start ? t : s, &to = p.is_start ? s : t;
-  check(from.next < 0 && to.previous < 0,
-        "walls '{}' and '{}': more than two segments meet at ({}, {}) m; "
-        "walls must be simple outlines with the fluid on their left",
-        walls.names[from.wall], walls.names[to.wall], p.place.x(), p.place.y());
-  from.next = p.is_start ? p.segment : q.segment;
-  to.previous = p.is_start ? q.segment : p.segment;
+template <int dim>
+std::vector<Side<dim>> sides_of_faces(const Walls<dim> &walls, const std::vector<int> &place) {
+  std::vector<Side<dim>> sides;
+  for (int f = 0; f < static_cast<int>(walls.faces.size()); ++f)
+    for (int k = 0; k < dim; ++k) {
+      const int a = place[walls.faces[f].vertex[k]];
+      if constexpr (dim == 2) {
+        sides.push_back({{a}, f, k, k == 0});
+      } else {
+        const int b = place[walls.faces[f].vertex[(k + 1) % 3]];
+        check(a != b, "wall '{}': face {} has two corners at {} m; remove the face",
+              walls.names[walls.faces[f].wall], walls.faces[f].number,
+              text_of(walls.position[walls.faces[f].vertex[k]]));
+        sides.push_back({{std::min(a, b), std::max(a, b)}, f, k, a < b});
+      }
+    }
+  std::stable_sort(sides.begin(), sides.end(),
+                   [](const auto &a, const auto &b) { return a.place < b.place; });
+  return sides;
+}
+
+[[noreturn]] void refuse_opposed(const Walls<2> &walls, const Side<2> &p, const Side<2> &q) {
+  const WallFace<2> &s = walls.faces[p.face], &t = walls.faces[q.face];
+  fail("walls '{}' and '{}' run against each other at {} m; reverse the points_m of one: the "
+       "fluid lies on the left of both",
+       walls.names[s.wall], walls.names[t.wall], text_of(walls.position[s.vertex[p.number]]));
+}
+
+[[noreturn]] void refuse_opposed(const Walls<3> &walls, const Side<3> &p, const Side<3> &q) {
+  const WallFace<3> &s = walls.faces[p.face], &t = walls.faces[q.face];
+  fail(
+      "face {} of wall '{}' and face {} of wall '{}' are turned against each other at their common "
+      "edge from {} to {} m; turn one round: the fluid sees the corners of both counter-clockwise",
+      s.number, walls.names[s.wall], t.number, walls.names[t.wall],
+      text_of(walls.position[s.vertex[p.number]]),
+      text_of(walls.position[s.vertex[(p.number + 1) % 3]]));
+}
+
+template <int dim>
+[[noreturn]] void refuse_branch(const Walls<dim> &walls, const Side<dim> &p, const Side<dim> &q) {
+  const WallFace<dim> &s = walls.faces[p.face], &t = walls.faces[q.face];
+  const std::string place = text_of(walls.position[s.vertex[p.number]]);
+  if constexpr (dim == 2)
+    fail("walls '{}' and '{}': more than two segments meet at {} m; "
+         "walls must be simple outlines with the fluid on their left",
+         walls.names[s.wall], walls.names[t.wall], place);
+  else
+    fail(
+        "more than two faces meet at the edge from {} to {} m, among them face {} of wall '{}' and "
+        "face {} of wall '{}'; a surface must not branch",
+        place, text_of(walls.position[s.vertex[(p.number + 1) % 3]]), s.number, walls.names[s.wall],
+        t.number, walls.names[t.wall]);
+}
+
+void list_faces_around(Walls<3> &walls, const std::vector<int> &place) {
+  const int n = static_cast<int>(place.size());
+  std::vector<std::vector<int>> at(n);
+  for (int f = 0; f < static_cast<int>(walls.faces.size()); ++f)
+    for (const int v : walls.faces[f].vertex)
+      at[place[v]].push_back(f);
+  walls.around_start.assign(1, 0);
+  walls.around.clear();
+  for (int v = 0; v < n; ++v) {
+    walls.around.insert(walls.around.end(), at[place[v]].begin(), at[place[v]].end());
+    walls.around_start.push_back(static_cast<int>(walls.around.size()));
+  }
 }
 
 } // namespace
 
-void link_outlines(Walls &walls) {
-  std::vector<SegmentEnd> ends;
-  for (int k = 0; k < static_cast<int>(walls.segments.size()); ++k) {
-    ends.push_back({walls.position[walls.segments[k].a], k, true});
-    ends.push_back({walls.position[walls.segments[k].b], k, false});
+template <int dim> void link_faces(Walls<dim> &walls) {
+  const std::vector<int> place = places_of_vertices(walls);
+  const std::vector<Side<dim>> sides = sides_of_faces(walls, place);
+  for (std::size_t k = 0; k + 1 < sides.size(); ++k) {
+    const Side<dim> &p = sides[k], &q = sides[k + 1];
+    if (p.place != q.place)
+      continue;
+    if (k + 2 < sides.size() && sides[k + 2].place == p.place)
+      refuse_branch(walls, p, sides[k + 2]);
+    if (p.forward == q.forward)
+      refuse_opposed(walls, p, q);
+    walls.faces[p.face].beyond[p.number] = q.face;
+    walls.faces[q.face].beyond[q.number] = p.face;
   }
-  // Along a direction that no wall of a scene has by design: few ends fall on one spot.
-  const auto along = [](const SegmentEnd &e) { return Vec<2>(0.5403, 0.8415).dot(e.place); };
-  std::sort(ends.begin(), ends.end(), [&](const SegmentEnd &p, const SegmentEnd &q) {
-    return along(p) < along(q);
-  });
-  for (std::size_t k = 0; k < ends.size(); ++k)
-    for (std::size_t m = k + 1; m < ends.size(); ++m) {
-      if (along(ends[m]) - along(ends[k]) > 1.01 * same_place)
-        break;
-      if (ends[m].segment != ends[k].segment && (ends[m].place - ends[k].place).norm() < same_place)
-        link(walls, ends[k], ends[m]);
-    }
+  if constexpr (dim == 3)
+    list_faces_around(walls, place);
 }
+
+template struct Walls<2>;
+template struct Walls<3>;
+template void find_near_faces(const Walls<2> &, const Grid<2> &, double, FaceGrid &);
+template PointWalls<2> project_on_walls(const Walls<2> &, std::span<const int>, const Vec<2> &,
+                                        double);
+template double distance_to_walls(const Walls<2> &, const Vec<2> &);
+template bool is_hidden(const Walls<2> &, std::span<const int>, const Vec<2> &, const Vec<2> &);
+template void link_faces(Walls<2> &);
+template void find_near_faces(const Walls<3> &, const Grid<3> &, double, FaceGrid &);
+template PointWalls<3> project_on_walls(const Walls<3> &, std::span<const int>, const Vec<3> &,
+                                        double);
+template double distance_to_walls(const Walls<3> &, const Vec<3> &);
+template bool is_hidden(const Walls<3> &, std::span<const int>, const Vec<3> &, const Vec<3> &);
+template void link_faces(Walls<3> &);
 
 } // namespace sluice::fluid

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// Walls: polylines of straight segments with the fluid on their left, used directly (no ghost
-// points). Points see a wall through projections: the locally nearest points of the polylines.
+// Walls: polylines of straight segments in the plane, surfaces of triangles in space, with the
+// fluid on their front, used directly (no ghost points). Points see a wall through projections: the
+// locally nearest points of the faces.
 #pragma once
 
 #include "bridge/base/vec.hpp"
 #include "fluid/neighbours.hpp"
+#include "fluid/wall_face.hpp"
 
 #include <array>
 #include <span>
@@ -13,75 +15,107 @@
 
 namespace sluice::fluid {
 
-struct WallSegment {
-  int a = 0, b = 0;            // vertices; the fluid lies on the left of a -> b
-  int previous = -1, next = -1; // neighbouring segments of the outline, -1 at an open end
-  int wall = 0;                // index into Walls::names
+template <int dim> constexpr std::array<int, dim> no_faces() {
+  std::array<int, dim> none;
+  none.fill(-1);
+  return none;
+}
+
+template <int dim> struct WallFace {
+  std::array<int, dim> vertex{}; // segment: the fluid lies on the left of a -> b; triangle:
+                                 // counter-clockwise seen from the fluid
+  int wall = 0;                  // index into Walls::names
+  int number = 0;                // of the face in its wall, as the user counts
+  std::array<int, dim> beyond = no_faces<dim>(); // the face that shares side k, -1 at an open side
 };
 
-/// Wall surface of a scene: vertices with position and velocity, and the segments between them.
-struct Walls {
-  std::vector<Vec<2>> position; // [m]
-  std::vector<Vec<2>> velocity; // [m/s]
-  std::vector<WallSegment> segments;
+/// What a wall does to the flow along it.
+enum class Slip : std::uint8_t { none, free };
+
+/// Wall surface of a scene: vertices with position and velocity, and the faces between them.
+template <int dim> struct Walls {
+  std::vector<Vec<dim>> position; // [m]
+  std::vector<Vec<dim>> velocity; // [m/s]
+  std::vector<WallFace<dim>> faces;
   std::vector<std::string> names;
+  std::vector<Slip> slip;            // per name
   std::vector<int> coupled_vertices; // moved by the bridge, in the order of its interface mesh
-  std::vector<int> coupled_segments;
+  std::vector<int> coupled_faces;
 
-  Vec<2> tangent(const WallSegment &s) const { return (position[s.b] - position[s.a]).normalized(); }
-  /// Unit normal of a segment, into the fluid.
-  Vec<2> normal(const WallSegment &s) const { return rotated_left(tangent(s)); }
+  /// In space: the faces around each vertex, those of other vertices at its place included.
+  std::vector<int> around_start, around;
+
+  Corners<dim> corners(const WallFace<dim> &f) const;
+  /// Unit normal of a face, into the fluid.
+  Vec<dim> normal(const WallFace<dim> &f) const { return face_normal(corners(f)); }
+  bool slips(int face) const { return slip[faces[face].wall] == Slip::free; }
 };
+
+/// Value on a face of a field that is given at the vertices.
+template <int dim>
+Vec<dim> value_at(std::span<const Vec<dim>> field, const WallFace<dim> &f,
+                  const Shape<dim> &shape) {
+  if constexpr (dim == 2)
+    return interpolated<Vec<2>>(shape, field[f.vertex[0]], field[f.vertex[1]]);
+  else
+    return interpolated<Vec<3>>(shape, field[f.vertex[0]], field[f.vertex[1]], field[f.vertex[2]]);
+}
 
 /// Nearest point of a wall to a fluid point.
-struct Projection {
-  Vec<2> point;    // on the wall [m]
-  Vec<2> normal;   // unit, out of the fluid
-  double distance; // [m], negative when the fluid point is behind the wall
-  double t;        // position on the segment, 0 at vertex a, 1 at b
-  int segment;
-  bool at_edge;    // on a sharp edge (turning by more than 30 degrees) or an open end: flow leaves
+template <int dim> struct Projection {
+  Vec<dim> point;   // on the wall [m]
+  Vec<dim> normal;  // unit, out of the fluid
+  double distance;  // [m], negative when the fluid point is behind the wall
+  Shape<dim> shape; // of the face's vertices
+  int face;
+  bool at_edge; // on a sharp edge (turning by more than 30 degrees) or an open one: flow leaves
 };
 
 /// Wall velocity at a projection [m/s].
-inline Vec<2> wall_velocity(const Walls &walls, const Projection &p) {
-  const WallSegment &s = walls.segments[p.segment];
-  return (1 - p.t) * walls.velocity[s.a] + p.t * walls.velocity[s.b];
+template <int dim> Vec<dim> wall_velocity(const Walls<dim> &walls, const Projection<dim> &p) {
+  return value_at<dim>(walls.velocity, walls.faces[p.face], p.shape);
 }
 
-/// The projections of one point, nearest first: the nearest three directions that differ by more
+/// Walls that a point can see at once: three in the plane; in space a corner between two more
+/// walls.
+template <int dim> inline constexpr int most_projections = dim == 2 ? 3 : 5;
+
+/// The projections of one point, nearest first: the nearest few directions that differ by more
 /// than 30 degrees, of each the nearest wall.
-struct PointWalls {
+template <int dim> struct PointWalls {
   int count = 0;
-  std::array<Projection, 3> projection;
+  std::array<Projection<dim>, most_projections<dim>> projection;
   auto begin() const { return projection.begin(); }
   auto end() const { return projection.begin() + count; }
 };
 
-/// Which segments come within `reach` of each grid cell.
-struct SegmentGrid {
+/// Which faces come within `reach` of each grid cell.
+struct FaceGrid {
   std::vector<int> start; // n_cells + 1
-  std::vector<int> segment;
+  std::vector<int> face;
   std::span<const int> near(int cell) const {
-    return {segment.data() + start[cell], segment.data() + start[cell + 1]};
+    return {face.data() + start[cell], face.data() + start[cell + 1]};
   }
 };
-void find_near_segments(const Walls &walls, const Grid &grid, double reach, SegmentGrid &near);
+template <int dim>
+void find_near_faces(const Walls<dim> &walls, const Grid<dim> &grid, double reach, FaceGrid &near);
 
-/// Projections of `x` on those of `candidates` within `reach`: local minima of the distance along
-/// the outlines, nearest first.
-PointWalls project_on_walls(const Walls &walls, std::span<const int> candidates, const Vec<2> &x,
-                            double reach);
+/// Projections of `x` on those of `candidates` within `reach`: local minima of the distance over
+/// the surface, nearest first.
+template <int dim>
+PointWalls<dim> project_on_walls(const Walls<dim> &walls, std::span<const int> candidates,
+                                 const Vec<dim> &x, double reach);
 
-/// Distance from `x` to the nearest of all segments [m].
-double distance_to_walls(const Walls &walls, const Vec<2> &x);
+/// Distance from `x` to the nearest of all faces [m].
+template <int dim> double distance_to_walls(const Walls<dim> &walls, const Vec<dim> &x);
 
-/// True when the straight line between two points crosses one of the segments.
-bool is_hidden(const Walls &walls, std::span<const int> candidates, const Vec<2> &from,
-               const Vec<2> &to);
+/// True when the straight line between two points crosses one of the faces.
+template <int dim>
+bool is_hidden(const Walls<dim> &walls, std::span<const int> candidates, const Vec<dim> &from,
+               const Vec<dim> &to);
 
-/// Links segments that share a vertex position into outlines; throws UserError on a vertex with
-/// more than two segments or two segments that point against each other.
-void link_outlines(Walls &walls);
+/// Links faces that share a side, by the position of their vertices, into surfaces; throws
+/// UserError on a side with more than two faces or two faces that are turned against each other.
+template <int dim> void link_faces(Walls<dim> &walls);
 
 } // namespace sluice::fluid

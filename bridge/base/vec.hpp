@@ -13,6 +13,11 @@ template <int dim> using Mat = Eigen::Matrix<double, dim, dim>;
 /// z-component of the cross product of two plane vectors.
 inline double cross(const Vec<2> &a, const Vec<2> &b) { return a.x() * b.y() - a.y() * b.x(); }
 
+inline Vec<3> cross(const Vec<3> &a, const Vec<3> &b) {
+  return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(),
+          a.x() * b.y() - a.y() * b.x()};
+}
+
 /// `v` turned by 90 degrees counter-clockwise.
 inline Vec<2> rotated_left(const Vec<2> &v) { return {-v.y(), v.x()}; }
 

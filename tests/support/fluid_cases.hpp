@@ -19,8 +19,8 @@
 namespace sluice::fluid::testing {
 
 /// Points at rest at the given places.
-inline Points points_at(const std::vector<Vec<2>> &position) {
-  Points points;
+inline Points<2> points_at(const std::vector<Vec<2>> &position) {
+  Points<2> points;
   const std::size_t n = position.size();
   points.position = position;
   for (auto *v :
@@ -57,50 +57,51 @@ inline std::vector<Vec<2>> random_points(int n, const Vec<2> &size, unsigned see
   return x;
 }
 
-inline void add_polyline(Walls &walls, const std::vector<Vec<2>> &vertices,
+inline void add_polyline(Walls<2> &walls, const std::vector<Vec<2>> &vertices,
                          const std::string &name = "wall") {
   const int first = static_cast<int>(walls.position.size());
   const int wall = static_cast<int>(walls.names.size());
   walls.names.push_back(name);
+  walls.slip.push_back(Slip::none);
   for (std::size_t k = 0; k < vertices.size(); ++k) {
     walls.position.push_back(vertices[k]);
     walls.velocity.emplace_back(0, 0);
     if (const int b = first + static_cast<int>(k); k > 0)
-      walls.segments.push_back({b - 1, b, -1, -1, wall});
+      walls.faces.push_back({{b - 1, b}, wall});
   }
 }
 
-inline Walls polyline(const std::vector<Vec<2>> &vertices) {
-  Walls walls;
+inline Walls<2> polyline(const std::vector<Vec<2>> &vertices) {
+  Walls<2> walls;
   add_polyline(walls, vertices);
-  link_outlines(walls);
+  link_faces(walls);
   return walls;
 }
 
 /// The inside of a box, closed on all sides.
-inline Walls closed_box(double width, double height) {
+inline Walls<2> closed_box(double width, double height) {
   return polyline({{0, height}, {0, 0}, {width, 0}, {width, height}, {0, height}});
 }
 
-inline std::vector<int> every_segment(const Walls &walls) {
+inline std::vector<int> every_face(const Walls<2> &walls) {
   std::vector<int> all;
-  for (int k = 0; k < static_cast<int>(walls.segments.size()); ++k)
+  for (int k = 0; k < static_cast<int>(walls.faces.size()); ++k)
     all.push_back(k);
   return all;
 }
 
 /// The projections of x on all walls.
-inline PointWalls project(const Walls &walls, const Vec<2> &x, double reach) {
-  return project_on_walls(walls, every_segment(walls), x, reach);
+inline PointWalls<2> project(const Walls<2> &walls, const Vec<2> &x, double reach) {
+  return project_on_walls(walls, every_face(walls), x, reach);
 }
 
 /// A cloud frozen as FluidSolver does, without moving the points.
 struct FrozenCloud {
-  Points points;
-  Walls walls;
-  Cloud cloud;
+  Points<2> points;
+  Walls<2> walls;
+  Cloud<2> cloud;
 
-  FrozenCloud(std::vector<Vec<2>> position, Walls w, double spacing)
+  FrozenCloud(std::vector<Vec<2>> position, Walls<2> w, double spacing)
       : points(points_at(position)), walls(std::move(w)) {
     update_walls(points, walls, spacing, cloud);
     update_neighbours(points, walls, cloud);
@@ -123,8 +124,8 @@ struct FrozenCloud {
 };
 
 /// Solver on a scene given as the text of a case file.
-inline Scene scene_of(const std::string &text, const std::vector<std::string> &overrides = {}) {
-  return read_scene(Config::parse(text, "case.toml", overrides));
+inline Scene<2> scene_of(const std::string &text, const std::vector<std::string> &overrides = {}) {
+  return read_scene<2>(Config::parse(text, "case.toml", overrides));
 }
 
 /// The elastic gate's tank with 4 mm between points and a gate of the given thickness [m].

@@ -38,8 +38,8 @@ double curvature_for(double gap) {
 }
 
 // The tank with the gate open by `gap` and water up to its face and under its lower edge.
-Scene opened_tank(double gap, unsigned seed) {
-  Scene scene =
+Scene<2> opened_tank(double gap, unsigned seed) {
+  Scene<2> scene =
       testing::scene_of(testing::gate_tank(2 * half_thickness), {"fluid.pressure_tolerance=1e-12"});
   const double curvature = curvature_for(gap);
   for (const int v : scene.walls.coupled_vertices) {
@@ -47,13 +47,13 @@ Scene opened_tank(double gap, unsigned seed) {
     scene.walls.position[v] = bent(length - x.y(), x.x() - clamp_x, curvature);
   }
   std::vector<Vec<2>> water;
-  const auto all = testing::every_segment(scene.walls);
+  const auto all = testing::every_face(scene.walls);
   for (const Vec<2> &x : testing::lattice(50, 35, spacing, seed == 0 ? 0 : 0.15, seed)) {
     if (x.y() > length ? x.x() > 0.1 : x.x() > bent(length, 0, curvature).x())
       continue;
-    const PointWalls near = project_on_walls(scene.walls, all, x, 2 * half_thickness);
+    const PointWalls<2> near = project_on_walls(scene.walls, all, x, 2 * half_thickness);
     bool is_clear = true;
-    for (const Projection &p : near)
+    for (const Projection<2> &p : near)
       is_clear = is_clear && p.distance > 0.2 * spacing;
     // the gate's own inside: not in sight of the middle of the tank at the same height
     if (is_clear && !is_hidden(scene.walls, all, x, Vec<2>(0.5 * spacing, x.y())))
@@ -64,7 +64,7 @@ Scene opened_tank(double gap, unsigned seed) {
 }
 
 /// M_a of force = -M_a dv/dt on the coupled vertices, x and y of each.
-Eigen::MatrixXd added_mass(FluidSolver &solver) {
+Eigen::MatrixXd added_mass(FluidSolver<2> &solver) {
   constexpr double dt = 1e-3, speed = 1e-2;
   solver.begin_step(dt);
   const auto &nodes = solver.walls.coupled_vertices;
@@ -88,7 +88,7 @@ class AddedMass : public ::testing::TestWithParam<double> {};
 
 TEST_P(AddedMass, OfTheWaterOnTheGateIsPositiveAtThisOpening) {
   for (const unsigned seed : {0u, 1u, 2u}) { // lattice, and two jittered clouds
-    FluidSolver solver(opened_tank(GetParam() * spacing, seed));
+    FluidSolver<2> solver(opened_tank(GetParam() * spacing, seed));
     const Eigen::MatrixXd mass = added_mass(solver);
     const Eigen::VectorXcd eigen = mass.eigenvalues();
     const double largest = eigen.real().maxCoeff(), smallest = eigen.real().minCoeff();

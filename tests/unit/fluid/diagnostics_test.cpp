@@ -18,7 +18,7 @@ TEST(CentreLine, DoesNotExistWithoutACoupledWall) {
 }
 
 TEST(CentreLine, OfABentGateTellsTheTankFromTheOutside) {
-  Walls walls = testing::scene_of(testing::gate_tank(0.005)).walls;
+  Walls<2> walls = testing::scene_of(testing::gate_tank(0.005)).walls;
   for (const int v :
        walls.coupled_vertices) { // sheared: 40 mm to the right and 10 mm up at the tip
     Vec<2> &x = walls.position[v];
@@ -40,10 +40,10 @@ TEST(CentreLine, OfABentGateTellsTheTankFromTheOutside) {
 TEST(WaterLevel, IsTheTopOfTheConnectedColumnAndIgnoresDropsAboveIt) {
   const double h = 0.1;
   auto x = testing::lattice(10, 20, h);
-  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, 0.0), 2.0, 1e-12);
+  EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, 0.0), 2.0, 1e-12);
   x.emplace_back(0.5, 3.0);
-  EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, 0.0), 2.0, 1e-12);
-  EXPECT_EQ(water_level(testing::points_at(x), 1.3, h, 0.0), 0);
+  EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, 0.0), 2.0, 1e-12);
+  EXPECT_EQ(water_level<2>(testing::points_at(x), VerticalLine<2>(1.3), h, 0.0), 0);
 }
 
 TEST(WaterLevel, DoesNotCareHowHighTheFloorIs) {
@@ -52,38 +52,38 @@ TEST(WaterLevel, DoesNotCareHowHighTheFloorIs) {
     auto x = testing::lattice(10, 20, h);
     for (Vec<2> &p : x)
       p.y() += floor;
-    EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, floor), floor + 2, 1e-12);
-    EXPECT_EQ(water_level(testing::points_at(x), 1.3, h, floor), floor); // dry
-    EXPECT_NEAR(water_level(testing::points_at(x), 0.5, h, std::nullopt), floor + 2, 1e-12);
-    EXPECT_TRUE(std::isnan(water_level(testing::points_at(x), 1.3, h, std::nullopt)));
+    EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, floor), floor + 2, 1e-12);
+    EXPECT_EQ(water_level<2>(testing::points_at(x), VerticalLine<2>(1.3), h, floor), floor); // dry
+    EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, std::nullopt), floor + 2, 1e-12);
+    EXPECT_TRUE(std::isnan(water_level<2>(testing::points_at(x), VerticalLine<2>(1.3), h, std::nullopt)));
   }
 }
 
 TEST(WaterLevel, ADropHighAboveADryFloorIsNoColumn) {
-  EXPECT_EQ(water_level(testing::points_at({{0.5, 2}}), 0.5, 0.1, 0.0), 0);
+  EXPECT_EQ(water_level<2>(testing::points_at({{0.5, 2}}), VerticalLine<2>(0.5), 0.1, 0.0), 0);
 }
 
 TEST(WaterLevel, TheFloorIsTheLowestWallWithTheFluidAboveIt) {
-  Walls walls;
+  Walls<2> walls;
   testing::add_polyline(walls, {{0, 5}, {0, -2}, {4, -1}, {4, 5}}); // a tank whose floor rises
   testing::add_polyline(walls, {{3, 1}, {2, 1}});                   // a plate's lower face
   testing::add_polyline(walls, {{2, 1.2}, {3, 1.2}});               // and its upper one
-  EXPECT_NEAR(floor_at(walls, 2.5).value(), -1.375, 1e-12);
-  EXPECT_FALSE(floor_at(walls, 6));
+  EXPECT_NEAR(floor_at<2>(walls, VerticalLine<2>(2.5)).value(), -1.375, 1e-12);
+  EXPECT_FALSE(floor_at<2>(walls, VerticalLine<2>(6)));
 }
 
 TEST(CentreLine, DoesNotExistForAFloorThatMoves) {
-  Walls walls = testing::polyline({{0, 1}, {0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}});
+  Walls<2> walls = testing::polyline({{0, 1}, {0, 0}, {1, 0}, {2, 0}, {3, 0}, {3, 1}});
   walls.coupled_vertices = {1, 2, 3, 4};
   EXPECT_FALSE(CentreLine(walls).exists());
 }
 
 TEST(Integrals, OfStillWaterAreItsVolumeAndItsWeightsPotential) {
-  FluidSolver solver(testing::scene_of(testing::gate_tank()));
+  FluidSolver<2> solver(testing::scene_of(testing::gate_tank()));
   solver.begin_step(1e-4);
   solver.iterate();
   solver.end_step();
-  const Integrals total = integrate(solver);
+  const Integrals<2> total = integrate(solver);
   EXPECT_NEAR(total.volume, 0.014, 1e-12);
   EXPECT_NEAR(total.point_volume, 0.014, 1e-12);
   EXPECT_NEAR(total.tank_volume, 0.014, 1e-12);

@@ -75,7 +75,7 @@ struct Contact {
   FrozenCloud frozen;
   int put_back = 0;
 
-  Contact(const Vec<2> &x, const Vec<2> &u, Walls walls) : frozen({x}, std::move(walls), h) {
+  Contact(const Vec<2> &x, const Vec<2> &u, Walls<2> walls) : frozen({x}, std::move(walls), h) {
     frozen.points.velocity[0] = u;
     put_back = keep_clear_of_walls(frozen.points, frozen.walls, {}, frozen.cloud).put_back;
   }
@@ -91,7 +91,7 @@ TEST(WallContact, PutsAPointBackFromBehindAWallAndTakesItsApproachVelocity) {
 }
 
 TEST(WallContact, LeavesAPointThatIsClearOrMovesAway) {
-  const Walls floor = testing::polyline({{0, 0}, {1, 0}});
+  const Walls<2> floor = testing::polyline({{0, 0}, {1, 0}});
   const Contact clear({0.5, 0.26 * h}, {2, -3}, floor);
   EXPECT_EQ(clear.position(), Vec<2>(0.5, 0.26 * h));
   EXPECT_EQ(clear.velocity(), Vec<2>(2, -3));
@@ -101,14 +101,14 @@ TEST(WallContact, LeavesAPointThatIsClearOrMovesAway) {
 }
 
 TEST(WallContact, MeasuresTheApproachAgainstAMovingWall) {
-  Walls floor = testing::polyline({{0, 0}, {1, 0}});
+  Walls<2> floor = testing::polyline({{0, 0}, {1, 0}});
   floor.velocity = {{0, 0.5}, {0, 0.5}};
   const Contact contact({0.5, 0.1 * h}, {0, 0}, floor);
   EXPECT_NEAR((contact.velocity() - Vec<2>(0, 0.5)).norm(), 0, 1e-14);
 }
 
 TEST(WallContact, PutsAPointBetweenTwoWallsToTheMiddle) {
-  Walls slit; // 0.3 spacings wide, less than two clearances
+  Walls<2> slit; // 0.3 spacings wide, less than two clearances
   testing::add_polyline(slit, {{0, 0}, {1, 0}}, "floor");
   testing::add_polyline(slit, {{1, 0.3 * h}, {0, 0.3 * h}}, "lid");
   for (const double y : {0.05, 0.29, -0.02, 0.15}) {
@@ -128,7 +128,7 @@ TEST(WallContact, HoldsAPointInACornerClearOfBothWalls) {
 TEST(Motion, IsExactForConstantAccelerationOnceTwoVelocitiesAreKnown) {
   const Vec<2> a(0.3, -9.81), u0(1, 2);
   const double dt[] = {0.01, 0.02, 0.003}; // in turn: the step may change
-  Points points = testing::points_at({{0, 0}});
+  Points<2> points = testing::points_at({{0, 0}});
   points.previous_velocity[0] = u0;
   points.velocity[0] = u0 + dt[0] * a;
   // Velocity is linear in time, so its mean over a step is the one extrapolated to the middle.
@@ -146,7 +146,7 @@ TEST(Motion, IsExactForConstantAccelerationOnceTwoVelocitiesAreKnown) {
 }
 
 TEST(Motion, AppliesAPlannedShiftOnceAndCorrectsTheVelocityForIt) {
-  Points points = testing::points_at({{0, 0}});
+  Points<2> points = testing::points_at({{0, 0}});
   points.shift[0] = {0.01, 0};
   points.shift_velocity[0] = {0, 0.5};
   move_points(points, 0.1, 0.1);

@@ -19,9 +19,9 @@ std::vector<int> sorted(std::span<const int> list) {
 }
 
 TEST(Neighbours, OfARandomCloudAreThoseOfBruteForce) {
-  Points points = testing::points_at(testing::random_points(500, {1.3, 0.7}, 11));
+  Points<2> points = testing::points_at(testing::random_points(500, {1.3, 0.7}, 11));
   const double radius = 0.09;
-  const Grid grid = grid_over(points, radius);
+  const Grid<2> grid = grid_over(points, radius);
   CellRanges ranges;
   NeighbourLists lists;
   sort_by_cell(points, grid, ranges);
@@ -40,7 +40,7 @@ TEST(Neighbours, HiddenOnesAreRemovedOnBothSidesOfAPlate) {
   const FrozenCloud frozen(testing::random_points(400, {2, 2}, 3),
                            testing::polyline({{1.01, 2.2}, {1.01, 0.6}, {0.99, 0.6}, {0.99, 2.2}}),
                            h);
-  const auto all = testing::every_segment(frozen.walls);
+  const auto all = testing::every_face(frozen.walls);
   std::set<std::pair<int, int>> pairs;
   int hidden = 0;
   for (int i = 0; i < frozen.size(); ++i)
@@ -60,8 +60,8 @@ TEST(Neighbours, HiddenOnesAreRemovedOnBothSidesOfAPlate) {
 }
 
 TEST(Neighbours, SortingKeepsEveryPointsDataTogether) {
-  Points points = testing::points_at(testing::random_points(300, {1, 1}, 2));
-  const Points before = points;
+  Points<2> points = testing::points_at(testing::random_points(300, {1, 1}, 2));
+  const Points<2> before = points;
   for (int i = 0; i < points.size(); ++i) {
     points.velocity[i] = {i, 1};
     points.previous_velocity[i] = {i, 2};
@@ -69,7 +69,7 @@ TEST(Neighbours, SortingKeepsEveryPointsDataTogether) {
     points.at_surface[i] = static_cast<SurfaceMemory>(i % 3);
   }
   CellRanges ranges;
-  const Grid grid = grid_over(points, 0.1);
+  const Grid<2> grid = grid_over(points, 0.1);
   sort_by_cell(points, grid, ranges);
   int moved = 0;
   for (int k = 0; k < points.size(); ++k) {
@@ -93,7 +93,7 @@ TEST(Neighbours, OnePointHasNone) {
 }
 
 TEST(Neighbours, APositionThatIsNoNumberIsRefusedWithItsId) {
-  Points points = testing::points_at({{0, 0}, {1, 0}, {std::nan(""), 0}});
+  Points<2> points = testing::points_at({{0, 0}, {1, 0}, {std::nan(""), 0}});
   const std::string message = testing::message_of([&] { grid_over(points, 0.1); });
   EXPECT_TRUE(testing::contains(message, "point 2")) << message;
 }

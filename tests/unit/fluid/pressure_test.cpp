@@ -24,7 +24,7 @@ struct Field {
 struct Problem {
   FrozenCloud frozen;
   PressureParams params;
-  PressureProblem pressure;
+  PressureProblem<2> pressure;
   std::vector<Vec<2>> predicted;
   std::vector<double> target;
 
@@ -193,10 +193,10 @@ TEST(Pressure, DiagonalsArePositiveAndInteriorRowsSumToZero) {
 // --- with the solver ------------------------------------------------------------------------
 
 TEST(PressureSolve, StillWaterHasHydrostaticPressureAndNoAccelerationAtEveryPoint) {
-  FluidSolver solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
+  FluidSolver<2> solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
   solver.begin_step(1e-3);
   solver.iterate();
-  const Points &points = solver.state.points;
+  const Points<2> &points = solver.state.points;
   double worst = 0, worst_force = 0;
   for (int i = 0; i < points.size(); ++i) {
     const double exact = 9810 * (0.14 - points.position[i].y());
@@ -212,7 +212,7 @@ TEST(PressureSolve, StillWaterHasHydrostaticPressureAndNoAccelerationAtEveryPoin
 }
 
 TEST(PressureSolve, LeavesTheResidualThatItWasAskedFor) {
-  FluidSolver solver(testing::scene_of(testing::dam_break));
+  FluidSolver<2> solver(testing::scene_of(testing::dam_break));
   for (int n = 0; n < 3; ++n) {
     solver.begin_step(5e-4);
     solver.iterate();
@@ -231,7 +231,7 @@ TEST(PressureSolve, LeavesTheResidualThatItWasAskedFor) {
 }
 
 TEST(PressureSolve, WallVelocityEntersTheRightHandSideAloneAndAffinely) {
-  FluidSolver solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
+  FluidSolver<2> solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
   solver.begin_step(1e-3);
   const auto matrix = solver.problem().matrix.value;
   const auto fluid_source = solver.problem().fluid_source;

@@ -18,15 +18,15 @@ std::string replaced(std::string text, const std::string &from, const std::strin
 }
 
 TEST(Scene, FillsTheWaterWithALatticeHalfASpacingOffTheWalls) {
-  const Scene scene = scene_of(testing::gate_tank());
-  const Points &points = scene.initial.points;
+  const Scene<2> scene = scene_of(testing::gate_tank());
+  const Points<2> &points = scene.initial.points;
   ASSERT_EQ(points.size(), 25 * 35);
   EXPECT_NEAR((points.position[0] - Vec<2>(0.002, 0.002)).norm(), 0, 1e-15);
-  EXPECT_EQ(scene.walls.coupled_vertices.size(), scene.walls.coupled_segments.size() + 1);
+  EXPECT_EQ(scene.walls.coupled_vertices.size(), scene.walls.coupled_faces.size() + 1);
 }
 
 TEST(Scene, ATiltedLatticeHoldsNearlyAsManyPoints) {
-  const Scene scene = scene_of(testing::gate_tank(), {"fluid.lattice_angle_deg=10"});
+  const Scene<2> scene = scene_of(testing::gate_tank(), {"fluid.lattice_angle_deg=10"});
   EXPECT_NEAR(scene.initial.points.size(), 875, 30); // half a point per spacing of the outline
 }
 
@@ -42,7 +42,7 @@ TEST(Scene, RefusesWaterThatOverlapsAWallWithNameAndPlace) {
 TEST(Scene, ALatticeFillsAnyConvexWaterWhereverItLiesAndHoweverItIsTurned) {
   const std::string text = replaced(testing::gate_tank(), "[0, 0]", "[0.0, 0.0]");
   for (const char *angle : {"-45", "-10", "0", "30", "45"}) {
-    const Scene scene = scene_of(text, {std::string("fluid.lattice_angle_deg=") + angle});
+    const Scene<2> scene = scene_of(text, {std::string("fluid.lattice_angle_deg=") + angle});
     EXPECT_NEAR(volume_error(scene), 0, 0.035) << angle; // half a point per spacing of the outline
   }
 }

@@ -11,7 +11,7 @@ namespace sluice::fluid {
 namespace {
 
 
-void advance(FluidSolver &solver, int steps) {
+void advance(FluidSolver<2> &solver, int steps) {
   for (int n = 0; n < steps; ++n) {
     solver.begin_step(5e-4);
     solver.iterate();
@@ -19,15 +19,15 @@ void advance(FluidSolver &solver, int steps) {
   }
 }
 
-Scene dam_break() { return testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}); }
+Scene<2> dam_break() { return testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}); }
 
-FluidState state_after(int steps) {
-  FluidSolver solver(dam_break());
+FluidState<2> state_after(int steps) {
+  FluidSolver<2> solver(dam_break());
   advance(solver, steps);
   return solver.state;
 }
 
-void expect_same_bits(const FluidState &a, const FluidState &b) {
+void expect_same_bits(const FluidState<2> &a, const FluidState<2> &b) {
   EXPECT_EQ(a.points.position, b.points.position);
   EXPECT_EQ(a.points.velocity, b.points.velocity);
   EXPECT_EQ(a.points.previous_velocity, b.points.previous_velocity);
@@ -48,7 +48,7 @@ void expect_same_bits(const FluidState &a, const FluidState &b) {
 // What read_state says of the file.
 std::string complaint(const std::filesystem::path &file) {
   try {
-    read_state(file);
+    read_state<2>(file);
   } catch (const UserError &error) {
     return error.what();
   }
@@ -57,14 +57,14 @@ std::string complaint(const std::filesystem::path &file) {
 
 TEST(StateFile, GivesBackEveryBit) {
   const TemporaryFolder folder;
-  FluidState state = state_after(12);
+  FluidState<2> state = state_after(12);
   state.wall_returns = 3;
   state.outflow_points = 1'000'000'000'000;
   state.lost_points = 5;
   state.outlet_energy = 1.0 / 3;
   state.outlet_momentum = {-1.0 / 7, 1e-300};
-  write_state(folder.path() / "state.h5", {state, 0.006, 0.004});
-  const SavedState read = read_state(folder.path() / "state.h5");
+  write_state<2>(folder.path() / "state.h5", {state, 0.006, 0.004});
+  const SavedState<2> read = read_state<2>(folder.path() / "state.h5");
   expect_same_bits(read.state, state);
   EXPECT_EQ(read.time, 0.006);
   EXPECT_EQ(read.spacing, 0.004);
@@ -72,18 +72,18 @@ TEST(StateFile, GivesBackEveryBit) {
 
 TEST(StateFile, ARunThatGoesOnFromItTakesTheSameSteps) {
   const TemporaryFolder folder;
-  write_state(folder.path() / "state.h5", {state_after(10), 0.005, 0.004});
-  Scene scene = dam_break();
-  scene.initial = read_state(folder.path() / "state.h5").state;
-  FluidSolver solver(scene);
+  write_state<2>(folder.path() / "state.h5", {state_after(10), 0.005, 0.004});
+  Scene<2> scene = dam_break();
+  scene.initial = read_state<2>(folder.path() / "state.h5").state;
+  FluidSolver<2> solver(scene);
   advance(solver, 10);
   expect_same_bits(solver.state, state_after(20));
 }
 
 TEST(StateFile, AnEmptySceneIsAStateToo) {
   const TemporaryFolder folder;
-  write_state(folder.path() / "state.h5", {FluidState{}, 0, 0.001});
-  EXPECT_EQ(read_state(folder.path() / "state.h5").state.points.size(), 0);
+  write_state<2>(folder.path() / "state.h5", {FluidState<2>{}, 0, 0.001});
+  EXPECT_EQ(read_state<2>(folder.path() / "state.h5").state.points.size(), 0);
 }
 
 TEST(StateFile, AMissingFileAFolderAndATextAreRefusedByName) {
@@ -111,23 +111,23 @@ TEST(StateFile, EveryTruncationIsRefused) {
 
 TEST(StateFile, APointThatIsNoNumberIsRefusedByIndex) {
   const TemporaryFolder folder;
-  FluidState state = state_after(1);
+  FluidState<2> state = state_after(1);
   state.points.velocity[7].y() = std::nan("");
-  write_state(folder.path() / "state.h5", {state, 5e-4, 0.004});
+  write_state<2>(folder.path() / "state.h5", {state, 5e-4, 0.004});
   EXPECT_NE(complaint(folder.path() / "state.h5").find("point 7 "), std::string::npos);
 }
 
 TEST(StateFile, ArraysOfUnequalLengthAreRefused) {
   const TemporaryFolder folder;
-  FluidState state = state_after(1);
+  FluidState<2> state = state_after(1);
   state.points.pressure.pop_back();
-  write_state(folder.path() / "state.h5", {state, 5e-4, 0.004});
+  write_state<2>(folder.path() / "state.h5", {state, 5e-4, 0.004});
   EXPECT_NE(complaint(folder.path() / "state.h5").find("'points/pressure'"), std::string::npos);
 }
 
 TEST(StateFile, AFolderThatIsNotThereIsAnErrorAndLeavesNothing) {
   const TemporaryFolder folder;
-  EXPECT_THROW(write_state(folder.path() / "none" / "state.h5", {FluidState{}, 0, 1}), UserError);
+  EXPECT_THROW(write_state<2>(folder.path() / "none" / "state.h5", {FluidState<2>{}, 0, 1}), UserError);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 

@@ -8,7 +8,7 @@
 namespace sluice::fluid {
 namespace {
 
-void advance(FluidSolver &solver, double dt, int steps) {
+void advance(FluidSolver<2> &solver, double dt, int steps) {
   for (int n = 0; n < steps; ++n) {
     solver.begin_step(dt);
     solver.iterate();
@@ -16,7 +16,7 @@ void advance(FluidSolver &solver, double dt, int steps) {
   }
 }
 
-void expect_same_bits(const Points &a, const Points &b) {
+void expect_same_bits(const Points<2> &a, const Points<2> &b) {
   ASSERT_EQ(a.id, b.id);
   ASSERT_EQ(a.pressure, b.pressure);
   ASSERT_EQ(a.position, b.position);
@@ -24,16 +24,16 @@ void expect_same_bits(const Points &a, const Points &b) {
   ASSERT_EQ(a.shift, b.shift);
 }
 
-void expect_rest(const Scene &scene, double speed, double energy) {
-  FluidSolver solver(scene);
+void expect_rest(const Scene<2> &scene, double speed, double energy) {
+  FluidSolver<2> solver(scene);
   advance(solver, 5e-4, 1);
-  const Integrals start = integrate(solver);
+  const Integrals<2> start = integrate(solver);
   double largest = start.max_speed;
   for (int n = 1; n < 100; ++n) {
     advance(solver, 5e-4, 1);
     largest = std::max(largest, integrate(solver).max_speed);
   }
-  const Integrals end = integrate(solver);
+  const Integrals<2> end = integrate(solver);
   const double scale = std::sqrt(9.81 * 0.14);
   std::printf("rest: largest speed %.2e sqrt(gH), energy change %.2e\n", largest / scale,
               (end.potential + end.kinetic) / (start.potential + start.kinetic) - 1);
@@ -54,9 +54,9 @@ TEST(Step, WaterAtRestBehindAThinRigidGateStaysAtRest) {
 }
 
 TEST(Step, OneThreadAndTwoGiveTheSameBits) {
-  const Scene scene = testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.001"});
+  const Scene<2> scene = testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.001"});
   const int threads = number_of_threads();
-  FluidSolver one(scene), two(scene);
+  FluidSolver<2> one(scene), two(scene);
   set_number_of_threads(1);
   advance(one, 2e-4, 4);
   set_number_of_threads(2);
@@ -70,11 +70,11 @@ TEST(Step, OneThreadAndTwoGiveTheSameBits) {
 // A tank full to its lid has no surface: the pressure is known up to a constant.
 TEST(Step, AClosedFullTankStaysAtRestUnderItsWeight) {
   const double h = 0.05;
-  Scene scene;
+  Scene<2> scene;
   scene.params.spacing = h;
   scene.walls = testing::closed_box(1, 0.8);
   scene.initial.points = testing::points_at(testing::lattice(20, 16, h));
-  FluidSolver solver(scene);
+  FluidSolver<2> solver(scene);
   advance(solver, 1e-3, 20);
   EXPECT_LT(integrate(solver).max_speed, 1e-6 * std::sqrt(9.81 * 0.8));
   const auto &points = solver.state.points;
@@ -84,19 +84,19 @@ TEST(Step, AClosedFullTankStaysAtRestUnderItsWeight) {
 }
 
 TEST(Step, WaterThatHasAllLeftIsSaidSo) {
-  Scene scene = testing::scene_of(testing::dam_break);
+  Scene<2> scene = testing::scene_of(testing::dam_break);
   scene.params.outlet_x = -1;
-  FluidSolver solver(scene);
+  FluidSolver<2> solver(scene);
   const std::string message = testing::message_of([&] { solver.begin_step(1e-3); });
   EXPECT_TRUE(testing::contains(message, "no water is left")) << message;
 }
 
 TEST(Step, ARestoredStateRepeatsItsStepsToTheBit) {
-  FluidSolver solver(testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}));
+  FluidSolver<2> solver(testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}));
   advance(solver, 5e-4, 10);
-  const FluidState checkpoint = solver.state;
+  const FluidState<2> checkpoint = solver.state;
   advance(solver, 5e-4, 5);
-  const FluidState first = solver.state;
+  const FluidState<2> first = solver.state;
   solver.state = checkpoint;
   advance(solver, 5e-4, 5);
   expect_same_bits(solver.state.points, first.points);
@@ -105,20 +105,20 @@ TEST(Step, ARestoredStateRepeatsItsStepsToTheBit) {
 }
 
 TEST(Step, ChangeOfMomentumIsWeightPlusWallImpulses) {
-  FluidSolver solver(testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}));
-  const FluidParams &params = solver.params();
+  FluidSolver<2> solver(testing::scene_of(testing::dam_break, {"fluid.spacing_m=0.004"}));
+  const FluidParams<2> &params = solver.params();
   constexpr double dt = 5e-4;
   constexpr int steps = 120;
   const double weight = params.density * 9.81 * 0.1 * 0.12;
   const double scale = params.density * 9.81 * 0.12 * 0.12 / 2; // rho g H^2 / 2
-  WallQuadrature walls;
+  WallQuadrature<2> walls;
   std::vector<Vec<2>> traction;
   Vec<2> impulse(0, 0);
   double worst = 0;
   for (int n = 0; n < steps; ++n) {
     solver.begin_step(dt);
     solver.iterate();
-    const Points &points = solver.state.points;
+    const Points<2> &points = solver.state.points;
     build_wall_quadrature(points, solver.walls, solver.cloud(), WallPart::all, walls);
     evaluate_tractions(points, solver.walls, solver.cloud(), solver.problem(), points.pressure,
                        params.viscosity, walls, traction);

@@ -15,7 +15,7 @@ constexpr double nu = 0.01;
 
 std::vector<Vec<2>> diffused(const FrozenCloud &frozen, std::vector<Vec<2>> u, double dt,
                              int steps = 1) {
-  ViscousProblem problem;
+  ViscousProblem<2> problem;
   KrylovMemory memory;
   for (int n = 0; n < steps; ++n)
     diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, nu, dt, u, problem, memory);
@@ -46,7 +46,7 @@ TEST(Viscosity, AShearModeBetweenTwoWallsDecaysAtTheAnalyticRate) {
   // sqrt(nu t) = 0.2 and is below exp(-(2 / 0.4)^2) = 1e-11 in the middle.
   constexpr int n = 16;
   const double h = 1.0 / n;
-  Walls channel;
+  Walls<2> channel;
   testing::add_polyline(channel, {{-1, 0}, {5, 0}}, "floor");
   testing::add_polyline(channel, {{5, 1}, {-1, 1}}, "lid");
   const FrozenCloud frozen(testing::lattice(4 * n, n, h), channel, h);

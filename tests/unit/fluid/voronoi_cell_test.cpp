@@ -10,11 +10,11 @@ namespace {
 constexpr double round_off = 1e-13; // of a few dozen additions of numbers of order one
 
 TEST(VoronoiCell, OnALatticeIsTheSquareOfTheSpacingAroundThePoint) {
-  VoronoiCell cell(1.5);
+  VoronoiCell<2> cell(1.5);
   for (int x = -2; x <= 2; ++x)
     for (int y = -2; y <= 2; ++y)
-      cell.cut_towards({x, y});
-  EXPECT_NEAR(cell.area(), 1, round_off);
+      cut_towards<2>(cell, {x, y});
+  EXPECT_NEAR(cell.volume(), 1, round_off);
   EXPECT_NEAR(cell.centroid().norm(), 0, round_off);
   EXPECT_NEAR(cell.reach(), std::sqrt(0.5), round_off);
 }
@@ -25,16 +25,16 @@ TEST(VoronoiCell, CellsOfARandomCloudTileTheBox) {
   double total = 0;
   Vec<2> moment(0, 0);
   for (const Vec<2> &xi : x) {
-    VoronoiCell cell(4);
+    VoronoiCell<2> cell(4);
     cell.cut({1, 0}, size.x() - xi.x());
     cell.cut({-1, 0}, xi.x());
     cell.cut({0, 1}, size.y() - xi.y());
     cell.cut({0, -1}, xi.y());
     for (const Vec<2> &xj : x)
-      cell.cut_towards(xj - xi);
-    EXPECT_GT(cell.area(), 0);
-    total += cell.area();
-    moment += cell.area() * (xi + cell.centroid());
+      cut_towards<2>(cell, xj - xi);
+    EXPECT_GT(cell.volume(), 0);
+    total += cell.volume();
+    moment += cell.volume() * (xi + cell.centroid());
   }
   EXPECT_NEAR(total, 6, 300 * round_off);
   EXPECT_NEAR((moment - 6 * 0.5 * size).norm(), 0, 300 * round_off);
@@ -44,18 +44,18 @@ TEST(VoronoiCell, NeverGrowsByACutAndStaysOnItsSideOfIt) {
   std::mt19937 engine(3);
   std::uniform_real_distribution<double> uniform(0, 1);
   for (int cloud = 0; cloud < 20; ++cloud) {
-    VoronoiCell cell(1);
+    VoronoiCell<2> cell(1);
     for (int k = 0; k < 30; ++k) {
-      const double area = cell.area(), reach = cell.reach();
+      const double area = cell.volume(), reach = cell.reach();
       const double angle = 6.2831853 * uniform(engine), offset = 0.1 + uniform(engine);
       const Vec<2> n(std::cos(angle), std::sin(angle));
       cell.cut(n, offset);
-      EXPECT_LE(cell.area(), area + round_off);
+      EXPECT_LE(cell.volume(), area + round_off);
       EXPECT_LE(cell.reach(), reach + round_off);
       for (int c = 0; c < cell.size(); ++c)
         EXPECT_LE(n.dot(cell.corner(c)), offset + round_off);
     }
-    EXPECT_GT(cell.area(), 0.03); // the circle of radius 0.1 is never cut into
+    EXPECT_GT(cell.volume(), 0.03); // the circle of radius 0.1 is never cut into
   }
 }
 

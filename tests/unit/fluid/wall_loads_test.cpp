@@ -9,8 +9,8 @@ namespace {
 
 constexpr double weight_density = 9810, depth = 0.14, gate = 0.079;
 
-FluidSolver still_water(const std::string &spacing) {
-  FluidSolver solver(testing::scene_of(
+FluidSolver<2> still_water(const std::string &spacing) {
+  FluidSolver<2> solver(testing::scene_of(
       testing::gate_tank(), {"fluid.spacing_m=" + spacing, "fluid.pressure_tolerance=1e-12"}));
   solver.begin_step(1e-3);
   solver.iterate();
@@ -20,8 +20,8 @@ FluidSolver still_water(const std::string &spacing) {
 class HydrostaticLoad : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(HydrostaticLoad, OnTheGateHasTheExactResultantAndMomentAboutTheClamp) {
-  const FluidSolver solver = still_water(GetParam());
-  const Resultant load = integrate_resultant(solver.quadrature(), solver.tractions());
+  const FluidSolver<2> solver = still_water(GetParam());
+  const Resultant<2> load = integrate_resultant(solver.quadrature(), solver.tractions());
   // pressure rho g (H - y) over 0 < y < L; moment about (0.1, L): integral of p (L - y)
   const double force = weight_density * (depth * gate - 0.5 * gate * gate);
   const double moment = weight_density * (0.5 * depth * gate * gate - gate * gate * gate / 6);
@@ -34,7 +34,7 @@ TEST_P(HydrostaticLoad, OnTheGateHasTheExactResultantAndMomentAboutTheClamp) {
 }
 
 TEST_P(HydrostaticLoad, LeavesTheLowerEdgeAndTheDryFaceOfASealedGateDry) {
-  const FluidSolver solver = still_water(GetParam());
+  const FluidSolver<2> solver = still_water(GetParam());
   EXPECT_GT(solver.quadrature().samples.size(), 30u);
   for (const auto &sample : solver.quadrature().samples)
     EXPECT_NEAR(sample.position.x(), 0.1, 1e-12) << "wet at y = " << sample.position.y();
@@ -47,11 +47,11 @@ TEST_P(HydrostaticLoad, LeavesTheLowerEdgeAndTheDryFaceOfASealedGateDry) {
 INSTANTIATE_TEST_SUITE_P(Spacings, HydrostaticLoad, ::testing::Values("0.004", "0.002"));
 
 TEST(WallLoads, NodalForcesHaveTheSumAndTheMomentOfTheTractions) {
-  FluidSolver solver = still_water("0.004");
+  FluidSolver<2> solver = still_water("0.004");
   for (const int v : solver.walls.coupled_vertices)
     solver.walls.velocity[v] = {0.1 * solver.walls.position[v].y(), -0.02};
   solver.iterate();
-  const Resultant load = integrate_resultant(solver.quadrature(), solver.tractions());
+  const Resultant<2> load = integrate_resultant(solver.quadrature(), solver.tractions());
   Vec<2> force(0, 0);
   double moment = 0, size = 0;
   for (std::size_t v = 0; v < solver.walls.position.size(); ++v) {
@@ -66,8 +66,8 @@ TEST(WallLoads, NodalForcesHaveTheSumAndTheMomentOfTheTractions) {
 }
 
 TEST(WallLoads, WeightsOfASampleArePositiveAndSumToOne) {
-  const FluidSolver solver = still_water("0.004");
-  const WallQuadrature &quadrature = solver.quadrature();
+  const FluidSolver<2> solver = still_water("0.004");
+  const WallQuadrature<2> &quadrature = solver.quadrature();
   for (const auto &sample : quadrature.samples) {
     double total = 0;
     for (int c = sample.first; c < sample.first + sample.count; ++c) {
@@ -79,14 +79,14 @@ TEST(WallLoads, WeightsOfASampleArePositiveAndSumToOne) {
 }
 
 TEST(WallLoads, ASegmentAboveTheWaterCarriesNothing) {
-  const FluidSolver solver = still_water("0.004");
-  WallQuadrature all;
+  const FluidSolver<2> solver = still_water("0.004");
+  WallQuadrature<2> all;
   build_wall_quadrature(solver.state.points, solver.walls, solver.cloud(), WallPart::all, all);
   double wet_tank = 0;
   for (const auto &sample : all.samples) {
     EXPECT_LT(sample.position.y(), depth + 0.004);
     EXPECT_LT(sample.position.x(), 0.1 + 1e-9);
-    wet_tank += sample.position.x() < 1e-12 ? sample.length : 0.0;
+    wet_tank += sample.position.x() < 1e-12 ? sample.measure : 0.0;
   }
   EXPECT_NEAR(wet_tank, depth, 0.004); // its water line is smeared over a spacing
 }

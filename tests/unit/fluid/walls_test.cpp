@@ -7,29 +7,29 @@
 namespace sluice::fluid {
 namespace {
 
-using testing::every_segment;
+using testing::every_face;
 using testing::polyline;
 using testing::project;
 
 constexpr double round_off = 1e-14;
 
 TEST(Walls, InsideASegmentThereIsOneProjectionAtThePerpendicularFoot) {
-  const Walls floor = polyline({{0, 0}, {4, 0}});
-  const PointWalls found = project(floor, {1, 0.5}, 2);
+  const Walls<2> floor = polyline({{0, 0}, {4, 0}});
+  const PointWalls<2> found = project(floor, {1, 0.5}, 2);
   ASSERT_EQ(found.count, 1);
-  const Projection &p = found.projection[0];
+  const Projection<2> &p = found.projection[0];
   EXPECT_NEAR((p.point - Vec<2>(1, 0)).norm(), 0, round_off);
   EXPECT_NEAR((p.normal - Vec<2>(0, -1)).norm(), 0, round_off);
   EXPECT_NEAR(p.distance, 0.5, round_off);
-  EXPECT_NEAR(p.t, 0.25, round_off);
+  EXPECT_NEAR(p.shape[1], 0.25, round_off);
   EXPECT_FALSE(p.at_edge);
   EXPECT_EQ(project(floor, {1, 2.5}, 2).count, 0);
 }
 
 TEST(Walls, DistanceIsNegativeBehindTheWallAndTheNormalStaysOutOfTheFluid) {
-  const Walls floor = polyline({{0, 0}, {2, 0}, {4, 0}});
+  const Walls<2> floor = polyline({{0, 0}, {2, 0}, {4, 0}});
   for (const double x : {1.0, 2.0, 3.0}) { // over a shared vertex as well
-    const PointWalls found = project(floor, {x, -0.3}, 2);
+    const PointWalls<2> found = project(floor, {x, -0.3}, 2);
     ASSERT_EQ(found.count, 1);
     EXPECT_NEAR(found.projection[0].distance, -0.3, round_off);
     EXPECT_NEAR((found.projection[0].normal - Vec<2>(0, -1)).norm(), 0, round_off);
@@ -37,8 +37,8 @@ TEST(Walls, DistanceIsNegativeBehindTheWallAndTheNormalStaysOutOfTheFluid) {
 }
 
 TEST(Walls, AConcaveCornerGivesTwoProjectionsNearestFirst) {
-  const Walls corner = polyline({{0, 4}, {0, 0}, {4, 0}});
-  const PointWalls found = project(corner, {0.5, 0.3}, 1);
+  const Walls<2> corner = polyline({{0, 4}, {0, 0}, {4, 0}});
+  const PointWalls<2> found = project(corner, {0.5, 0.3}, 1);
   ASSERT_EQ(found.count, 2);
   EXPECT_NEAR(found.projection[0].distance, 0.3, round_off);
   EXPECT_NEAR(found.projection[1].distance, 0.5, round_off);
@@ -48,8 +48,8 @@ TEST(Walls, AConcaveCornerGivesTwoProjectionsNearestFirst) {
 
 TEST(Walls, ASharpEdgeGivesOneProjectionMarkedAsEdge) {
   // The lower right corner of a plate: down its right face and along its lower edge to the left.
-  const Walls edge = polyline({{0, 4}, {0, 0}, {-4, 0}});
-  const PointWalls found = project(edge, {0.3, -0.4}, 1);
+  const Walls<2> edge = polyline({{0, 4}, {0, 0}, {-4, 0}});
+  const PointWalls<2> found = project(edge, {0.3, -0.4}, 1);
   ASSERT_EQ(found.count, 1);
   EXPECT_TRUE(found.projection[0].at_edge);
   EXPECT_NEAR(found.projection[0].distance, 0.5, round_off);
@@ -57,9 +57,9 @@ TEST(Walls, ASharpEdgeGivesOneProjectionMarkedAsEdge) {
 }
 
 TEST(Walls, TheOpenEndOfAWallIsAnEdge) {
-  const Walls step = polyline({{0, 0}, {4, 0}});
+  const Walls<2> step = polyline({{0, 0}, {4, 0}});
   for (const Vec<2> &x : {Vec<2>(-0.3, 0.4), Vec<2>(4.3, 0.4)}) {
-    const PointWalls found = project(step, x, 1);
+    const PointWalls<2> found = project(step, x, 1);
     ASSERT_EQ(found.count, 1);
     EXPECT_TRUE(found.projection[0].at_edge);
     EXPECT_NEAR(found.projection[0].distance, 0.5, round_off);
@@ -71,11 +71,11 @@ TEST(Walls, AMildlyConvexPolylineGivesOneProjectionEverywhere) {
   std::vector<Vec<2>> arc;
   for (int k = 0; k <= 9; ++k)
     arc.emplace_back(-std::cos(k * 0.1745), std::sin(k * 0.1745)); // clockwise, fluid on the left
-  const Walls gate = polyline(arc);
+  const Walls<2> gate = polyline(arc);
   for (int k = 1; k < 80; ++k) {
     const double angle = 0.05 + k * 0.0175;
     const Vec<2> x = 1.2 * Vec<2>(-std::cos(angle), std::sin(angle));
-    const PointWalls found = project(gate, x, 0.5);
+    const PointWalls<2> found = project(gate, x, 0.5);
     ASSERT_EQ(found.count, 1) << "at " << angle;
     EXPECT_FALSE(found.projection[0].at_edge);
     EXPECT_NEAR(found.projection[0].distance, 0.2, 0.004); // sagitta 1 - cos(5 degrees)
@@ -84,16 +84,16 @@ TEST(Walls, AMildlyConvexPolylineGivesOneProjectionEverywhere) {
 
 // Four walls around a point, three places: the nearest three, whatever the order of the segments.
 TEST(Walls, TheNearestThreeDirectionsDoNotDependOnTheOrderOfTheSegments) {
-  Walls walls;
+  Walls<2> walls;
   testing::add_polyline(walls, {{0.4, 2}, {0.4, -2}}, "left");   // 0.1 away
   testing::add_polyline(walls, {{-2, 0.3}, {2, 0.3}}, "below");  // 0.2
   testing::add_polyline(walls, {{0.8, -2}, {0.8, 2}}, "right");  // 0.3
   testing::add_polyline(walls, {{2, 0.9}, {-2, 0.9}}, "above");  // 0.4
   testing::add_polyline(walls, {{0.35, 2}, {0.35, -2}}, "left, farther"); // 0.15
   const Vec<2> x(0.5, 0.5);
-  std::vector<int> order = every_segment(walls);
+  std::vector<int> order = every_face(walls);
   do {
-    const PointWalls found = project_on_walls(walls, order, x, 1);
+    const PointWalls<2> found = project_on_walls(walls, order, x, 1);
     ASSERT_EQ(found.count, 3);
     for (int k = 0; k < 3; ++k)
       ASSERT_NEAR(found.projection[k].distance, 0.1 * (k + 1), round_off);
@@ -102,22 +102,22 @@ TEST(Walls, TheNearestThreeDirectionsDoNotDependOnTheOrderOfTheSegments) {
 
 // Seen through the plate, the point would count as lying outside of the fluid.
 TEST(Walls, TheFarFaceOfAThinPlateHasNoProjection) {
-  const Walls plate = polyline({{0.1, 2}, {0.1, 0}, {0, 0}, {0, 2}});
-  const PointWalls found = project(plate, {-0.05, 1}, 0.3);
+  const Walls<2> plate = polyline({{0.1, 2}, {0.1, 0}, {0, 0}, {0, 2}});
+  const PointWalls<2> found = project(plate, {-0.05, 1}, 0.3);
   ASSERT_EQ(found.count, 1);
   EXPECT_NEAR(found.projection[0].distance, 0.05, round_off);
 }
 
 TEST(Walls, VelocityAtAProjectionIsInterpolatedAlongTheSegment) {
-  Walls floor = polyline({{0, 0}, {4, 0}});
+  Walls<2> floor = polyline({{0, 0}, {4, 0}});
   floor.velocity = {{1, 2}, {5, -2}};
-  const PointWalls found = project(floor, {1, 0.5}, 2);
+  const PointWalls<2> found = project(floor, {1, 0.5}, 2);
   EXPECT_NEAR((wall_velocity(floor, found.projection[0]) - Vec<2>(2, 1)).norm(), 0, round_off);
 }
 
 TEST(Walls, AThinPlateHidesWhatIsBehindItAndNotWhatIsRoundItsFreeEnd) {
-  const Walls plate = polyline({{0.01, 1}, {0.01, 0}, {-0.01, 0}, {-0.01, 1}});
-  const auto all = every_segment(plate);
+  const Walls<2> plate = polyline({{0.01, 1}, {0.01, 0}, {-0.01, 0}, {-0.01, 1}});
+  const auto all = every_face(plate);
   EXPECT_TRUE(is_hidden(plate, all, {-0.2, 0.5}, {0.2, 0.5}));
   EXPECT_TRUE(is_hidden(plate, all, {0.2, 0.5}, {-0.2, 0.5}));
   EXPECT_TRUE(is_hidden(plate, all, {-0.2, 0.1}, {0.2, -0.05}));
@@ -127,20 +127,20 @@ TEST(Walls, AThinPlateHidesWhatIsBehindItAndNotWhatIsRoundItsFreeEnd) {
 }
 
 TEST(Walls, ALineThroughASharedVertexIsHidden) {
-  const Walls wall = polyline({{0, -1}, {0, 0}, {0, 1}});
-  EXPECT_TRUE(is_hidden(wall, every_segment(wall), {-1, 0}, {1, 0}));
-  EXPECT_TRUE(is_hidden(wall, every_segment(wall), {1, 0}, {-1, 0}));
+  const Walls<2> wall = polyline({{0, -1}, {0, 0}, {0, 1}});
+  EXPECT_TRUE(is_hidden(wall, every_face(wall), {-1, 0}, {1, 0}));
+  EXPECT_TRUE(is_hidden(wall, every_face(wall), {1, 0}, {-1, 0}));
 }
 
 TEST(Walls, TheGridListsEverySegmentWithinReach) {
-  const Walls walls = polyline({{0.13, 3.9}, {0.31, 0.22}, {2.7, 0.4}, {3.7, 2.2}});
+  const Walls<2> walls = polyline({{0.13, 3.9}, {0.31, 0.22}, {2.7, 0.4}, {3.7, 2.2}});
   const auto x = testing::random_points(400, {4, 4}, 5);
-  const Grid grid = grid_over(testing::points_at(x), 0.5);
-  SegmentGrid near;
-  find_near_segments(walls, grid, 0.5, near);
+  const Grid<2> grid = grid_over(testing::points_at(x), 0.5);
+  FaceGrid near;
+  find_near_faces(walls, grid, 0.5, near);
   for (const Vec<2> &p : x) {
-    const PointWalls from_grid = project_on_walls(walls, near.near(grid.cell(p)), p, 0.5);
-    const PointWalls from_all = project(walls, p, 0.5);
+    const PointWalls<2> from_grid = project_on_walls(walls, near.near(grid.cell(p)), p, 0.5);
+    const PointWalls<2> from_all = project(walls, p, 0.5);
     ASSERT_EQ(from_grid.count, from_all.count);
     for (int k = 0; k < from_all.count; ++k)
       EXPECT_EQ(from_grid.projection[k].point, from_all.projection[k].point);
@@ -148,30 +148,30 @@ TEST(Walls, TheGridListsEverySegmentWithinReach) {
 }
 
 TEST(Walls, LinkingJoinsWallsThatShareAnEnd) {
-  Walls walls;
+  Walls<2> walls;
   testing::add_polyline(walls, {{0, 1}, {0, 0}}, "left");
   testing::add_polyline(walls, {{0, 0}, {1, 0}}, "floor");
-  link_outlines(walls);
-  EXPECT_EQ(walls.segments[0].next, 1);
-  EXPECT_EQ(walls.segments[1].previous, 0);
-  EXPECT_EQ(walls.segments[0].previous, -1);
-  EXPECT_EQ(walls.segments[1].next, -1);
+  link_faces(walls);
+  EXPECT_EQ(walls.faces[0].beyond[1], 1);
+  EXPECT_EQ(walls.faces[1].beyond[0], 0);
+  EXPECT_EQ(walls.faces[0].beyond[0], -1);
+  EXPECT_EQ(walls.faces[1].beyond[1], -1);
 }
 
 TEST(Walls, LinkingRefusesABranchingVertexAndSaysWhere) {
-  Walls walls;
+  Walls<2> walls;
   testing::add_polyline(walls, {{0, 1}, {0.25, 0.5}, {1, 0}}, "left");
   testing::add_polyline(walls, {{0.25, 0.5}, {2, 2}}, "branch");
-  const std::string message = testing::message_of([&] { link_outlines(walls); });
+  const std::string message = testing::message_of([&] { link_faces(walls); });
   EXPECT_TRUE(testing::contains(message, "branch")) << message;
   EXPECT_TRUE(testing::contains(message, "(0.25, 0.5)")) << message;
 }
 
 TEST(Walls, LinkingRefusesTwoWallsThatRunAgainstEachOther) {
-  Walls walls;
+  Walls<2> walls;
   testing::add_polyline(walls, {{0, 1}, {0, 0}}, "left");
   testing::add_polyline(walls, {{1, 0}, {0, 0}}, "floor");
-  EXPECT_NE(testing::message_of([&] { link_outlines(walls); }), "");
+  EXPECT_NE(testing::message_of([&] { link_faces(walls); }), "");
 }
 
 } // namespace
