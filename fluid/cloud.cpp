@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace sluice::fluid {
@@ -100,7 +101,8 @@ public:
   void update(int i) const {
     const VoronoiCell<dim> cell = cell_of(i);
     const bool was_open = points_.at_surface[i] == SurfaceMemory::open;
-    const double limit = (was_open ? close_ratio : open_ratio) * cloud_.spacing;
+    const double limit = cloud_.has_air ? (was_open ? close_ratio : open_ratio) * cloud_.spacing
+                                        : std::numeric_limits<double>::infinity();
     cloud_.surface_normal[i] = Vec<dim>::Zero();
     cloud_.kind[i] = PointKind::interior;
     const bool is_open = cell.reach() > limit;

@@ -20,8 +20,9 @@ enum class PointKind : std::uint8_t {
 };
 
 template <int dim> struct Cloud {
-  double spacing = 0; // nominal distance between points [m]
-  double radius = 0;  // of the kernel [m]
+  double spacing = 0;  // nominal distance between points [m]
+  double radius = 0;   // of the kernel [m]
+  bool has_air = true; // false: the fluid fills its container, holes are no surface
   Grid<dim> grid;
   CellRanges ranges;
   NeighbourLists neighbours; // those in sight

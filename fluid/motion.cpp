@@ -95,12 +95,19 @@ ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &wa
   return {static_cast<int>(sums[0]), static_cast<int>(sums[1]), Vec<dim>(&sums[2])};
 }
 
+template <int dim> double pace_of(const Points<dim> &points, double gravity, double spacing) {
+  if (gravity > 0)
+    return std::sqrt(gravity / spacing);
+  const double speed2 = sum(points.size(), [&](int i) { return points.velocity[i].squaredNorm(); });
+  return std::sqrt(speed2 / std::max(points.size(), 1)) / spacing;
+}
+
 template <int dim>
 void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cloud,
-                                 const MotionParams &params, double gravity,
+                                 const MotionParams &params, double pace,
                                  std::span<double> divergence) {
   const double volume = volume_of_point<dim>(cloud.spacing);
-  const double rate = params.volume_rate * std::sqrt(gravity / cloud.spacing);
+  const double rate = params.volume_rate * pace;
   constexpr double largest_error = 0.3;
   for_each_point(points.size(), [&](int i) {
     divergence[i] = 0;
@@ -179,12 +186,14 @@ void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams
 }
 
 template void move_points(Points<2> &, double, double);
+template double pace_of(const Points<2> &, double, double);
 template ContactCounts<2> keep_clear_of_walls(Points<2> &, const Walls<2> &, const MotionParams &,
                                               const Cloud<2> &);
 template void volume_restoring_divergence(const Points<2> &, const Cloud<2> &, const MotionParams &,
                                           double, std::span<double>);
 template void plan_shift(Points<2> &, const Cloud<2> &, const MotionParams &, MatView<2>, double);
 template void move_points(Points<3> &, double, double);
+template double pace_of(const Points<3> &, double, double);
 template ContactCounts<3> keep_clear_of_walls(Points<3> &, const Walls<3> &, const MotionParams &,
                                               const Cloud<3> &);
 template void volume_restoring_divergence(const Points<3> &, const Cloud<3> &, const MotionParams &,

@@ -88,9 +88,9 @@ vtkNew<vtkCellArray> one_vertex_per_point(std::size_t n) {
 
 } // namespace
 
-template <int dim>
-void PointOutput::write(const Points<dim> &points, const Cloud<dim> &cloud, std::int64_t step,
-                        double time) {
+template <int dim> void PointOutput::write(const FluidSolver<dim> &solver, double time) {
+  const Points<dim> &points = solver.state.points;
+  const Cloud<dim> &cloud = solver.cloud();
   vtkNew<vtkPolyData> data;
   const std::size_t n = points.position.size();
   const bool is_frozen = cloud.kind.size() == n; // not before the first step
@@ -106,7 +106,11 @@ void PointOutput::write(const Points<dim> &points, const Cloud<dim> &cloud, std:
   add_array<vtkFloatArray>(data->GetPointData(), "volume", n,
                            [&](std::size_t i) { return is_frozen ? cloud.cell_volume[i] : 0.0; });
   add_vectors(data->GetPointData(), "velocity", points.velocity);
-  const auto file = next_file(step);
+  if (const auto viscosity = solver.viscosity();
+      viscosity.size() == n && !solver.params().rheology.is_newtonian())
+    add_array<vtkFloatArray>(data->GetPointData(), "viscosity", n,
+                             [&](std::size_t i) { return viscosity[i]; });
+  const auto file = next_file(solver.state.step);
   write_file(file, data);
   written(file, time);
 }
@@ -132,9 +136,9 @@ template <int dim> void WallOutput::write(const Walls<dim> &walls, std::int64_t 
   written(file, time);
 }
 
-template void PointOutput::write(const Points<2> &, const Cloud<2> &, std::int64_t, double);
+template void PointOutput::write(const FluidSolver<2> &, double);
 template void WallOutput::write(const Walls<2> &, std::int64_t, double);
-template void PointOutput::write(const Points<3> &, const Cloud<3> &, std::int64_t, double);
+template void PointOutput::write(const FluidSolver<3> &, double);
 template void WallOutput::write(const Walls<3> &, std::int64_t, double);
 
 } // namespace sluice::fluid

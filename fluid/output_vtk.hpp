@@ -28,12 +28,11 @@ private:
 };
 
 /// fluid_*.vtp: points with pressure [Pa], velocity [m/s], kind (0 interior, 1 surface, 2 thin),
-/// id.
+/// id, volume [m^2] and, where it varies, viscosity [Pa s].
 class PointOutput : VtkSeries {
 public:
   explicit PointOutput(const std::filesystem::path &folder) : VtkSeries(folder, "fluid") {}
-  template <int dim>
-  void write(const Points<dim> &points, const Cloud<dim> &cloud, std::int64_t step, double time);
+  template <int dim> void write(const FluidSolver<dim> &solver, double time);
 };
 
 /// wall_*.vtp: segments or triangles with velocity [m/s] and the number of their wall.

@@ -204,8 +204,6 @@ Vec<dim> renormalising_skew(const Stencil<dim> &s, const Points<dim> &points,
   return fit.inverse() * offset;
 }
 
-enum class RowKind { quadratic, linear, plain };
-
 /// The fallback ladder: the first row whose signs keep the matrix definite.
 template <int dim>
 RowKind laplacian_row(const Stencil<dim> &s, const Points<dim> &points, const Cloud<dim> &cloud,
@@ -251,26 +249,24 @@ template <int dim> void lay_out(const Cloud<dim> &cloud, PressureProblem<dim> &p
   problem.fluid_source.resize(n);
   problem.source.resize(n);
   problem.gradient.resize(n);
+  problem.row_kind.resize(n);
   problem.velocity_gradient.resize(n);
   problem.wall_rows.assign(cloud.point_walls.size(), {});
 }
 
-template <int dim> class Assembler {
+/// What the cloud alone decides: matrix, gradient functionals, weights of the wall data.
+template <int dim> class OperatorAssembler {
 public:
-  Assembler(const Points<dim> &points, const Cloud<dim> &cloud, const PressureParams &params,
-            VecView<dim> velocity, std::span<const double> target, double dt,
-            PressureProblem<dim> &problem)
-      : points_(points), cloud_(cloud), params_(params), velocity_(velocity), target_(target),
-        dt_(dt), problem_(problem) {}
+  OperatorAssembler(const Points<dim> &points, const Cloud<dim> &cloud,
+                    const PressureParams &params, PressureProblem<dim> &problem)
+      : points_(points), cloud_(cloud), params_(params), problem_(problem) {}
 
   RowKind row(int i) const {
     Stencil<dim> s;
     gather(i, points_, cloud_, s);
-    if (cloud_.kind[i] != PointKind::interior) {
-      open_row(s);
-      return RowKind::quadratic;
-    }
-    return poisson_row(s);
+    const RowKind kind = cloud_.kind[i] != PointKind::interior ? open_row(s) : poisson_row(s);
+    problem_.row_kind[i] = kind;
+    return kind;
   }
 
 private:
@@ -279,14 +275,13 @@ private:
             static_cast<std::size_t>(s.count)};
   }
 
-  void open_row(const Stencil<dim> &s) const {
+  RowKind open_row(const Stencil<dim> &s) const {
     problem_.matrix.value[problem_.matrix.row_start[s.i]] = 1;
-    problem_.fluid_source[s.i] = 0;
     surface_row(s, cloud_, off_diagonal(s));
     problem_.gradient[s.i] = linear_gradient(s, cloud_);
-    update_velocity_gradient(s, linear_functional(s));
     if (s.walls)
       problem_.wall_rows[cloud_.wall_slot[s.i]] = {};
+    return RowKind::open;
   }
 
   RowKind poisson_row(const Stencil<dim> &s) const {
@@ -297,47 +292,29 @@ private:
         laplacian_row(s, points_, cloud_, regular ? &fit : nullptr, params_.row_guard, row);
     if (kind != RowKind::quadratic)
       problem_.gradient[s.i] = linear_gradient(s, cloud_);
-    bool near_wall = false;
-    for_each_wall_row(s, cloud_, [&](int, const Projection<dim> &) { near_wall = true; });
-    const bool symmetric = kind == RowKind::quadratic && !near_wall;
-    update_velocity_gradient(s, symmetric ? problem_.gradient[s.i] : linear_functional(s));
-    update_wall_rows(s, row.wall);
+    set_wall_rows(s, row.wall);
     finish_poisson_row(s, row);
     return kind;
   }
 
   // False when the cloud hardly determines the quadratic: on a lattice the functionals have a norm
-  // of 2.5 / h, next to walls 11 / h; beyond the limit they amplify the noise of single points.
+  // of 2.5 / h, next to walls 15 / h; beyond the limit they amplify the noise of single points.
   bool set_quadratic_gradient(const Stencil<dim> &s, const QuadraticFit<dim> &fit) const {
-    constexpr double largest_norm = 20;
     auto &gradient = problem_.gradient[s.i];
     for (int d = 0; d < dim; ++d)
       gradient.col(d) = fit.solve(derivative_functional<dim>(d, s.h));
-    return gradient.norm() * s.h < largest_norm;
+    return gradient.norm() * s.h < params_.gradient_guard;
   }
 
-  Functionals<dim> linear_functional(const Stencil<dim> &s) const {
-    Functionals<dim> functional = Functionals<dim>::Zero();
-    functional.template topRows<dim>() = fluid_gradient(s);
-    return functional;
-  }
-
-  void update_velocity_gradient(const Stencil<dim> &s, const Functionals<dim> &functional) const {
-    problem_.velocity_gradient[s.i] = velocity_gradient(s, velocity_, functional);
-  }
-
-  void update_wall_rows(const Stencil<dim> &s,
-                        const std::array<double, most_projections<dim>> &laplacian) const {
+  void set_wall_rows(const Stencil<dim> &s,
+                     const std::array<double, most_projections<dim>> &laplacian) const {
     const double scale = cloud_.spacing * cloud_.spacing;
     for_each_wall_row(s, cloud_, [&](int m, const Projection<dim> &p) {
-      const Vec<dim> r = p.point - points_.position[s.i];
-      const Vec<dim> u = velocity_[s.i] + problem_.velocity_gradient[s.i] * r;
+      const Vec<dim> q = (p.point - points_.position[s.i]) / s.h;
       WallRow<dim> &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
-      wall.approach = p.normal.dot(u);
       wall.laplacian = scale * laplacian[m];
       wall.gradient =
-          wall_weight * s.h *
-          (problem_.gradient[s.i].transpose() * normal_derivative<dim>(r / s.h, p.normal));
+          wall_weight * s.h * (problem_.gradient[s.i].transpose() * normal_derivative(q, p.normal));
     });
   }
 
@@ -349,21 +326,61 @@ private:
       sum -= a;
     }
     problem_.matrix.value[problem_.matrix.row_start[s.i]] = sum > 0 ? sum : 1.0;
-    double source =
-        params_.density / dt_ * (problem_.velocity_gradient[s.i].trace() - target_[s.i]) * scale;
-    for_each_wall_row(s, cloud_, [&](int m, const Projection<dim> &) {
-      const WallRow<dim> &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
-      source -= wall.laplacian * params_.density / dt_ * wall.approach;
-    });
-    problem_.fluid_source[s.i] = -source;
   }
 
   const Points<dim> &points_;
   const Cloud<dim> &cloud_;
   const PressureParams &params_;
+  PressureProblem<dim> &problem_;
+};
+
+/// What the predicted velocity adds: its gradient, its approach to the walls, the source.
+template <int dim> class SourceAssembler {
+public:
+  SourceAssembler(const Points<dim> &points, const Cloud<dim> &cloud, const PressureParams &params,
+                  VecView<dim> velocity, std::span<const double> target, double dt,
+                  PressureProblem<dim> &problem)
+      : points_(points), cloud_(cloud), velocity_(velocity), target_(target),
+        factor_(params.density / dt), problem_(problem) {}
+
+  void row(int i) const {
+    Stencil<dim> s;
+    gather(i, points_, cloud_, s);
+    problem_.velocity_gradient[i] = velocity_gradient(s, velocity_, functional_of(s));
+    problem_.fluid_source[i] = s.open ? 0.0 : -source_of(s);
+  }
+
+private:
+  // Far from walls the pressure's gradient, which is quadratic; next to one its rows do not hold
+  // for a velocity.
+  Functionals<dim> functional_of(const Stencil<dim> &s) const {
+    bool near_wall = false;
+    for_each_wall_row(s, cloud_, [&](int, const Projection<dim> &) { near_wall = true; });
+    if (problem_.row_kind[s.i] == RowKind::quadratic && !near_wall)
+      return problem_.gradient[s.i];
+    Functionals<dim> functional = Functionals<dim>::Zero();
+    functional.template topRows<dim>() = fluid_gradient(s);
+    return functional;
+  }
+
+  double source_of(const Stencil<dim> &s) const {
+    const double scale = cloud_.spacing * cloud_.spacing;
+    const Mat<dim> &gradient = problem_.velocity_gradient[s.i];
+    double source = factor_ * (gradient.trace() - target_[s.i]) * scale;
+    for_each_wall_row(s, cloud_, [&](int m, const Projection<dim> &p) {
+      const Vec<dim> at_wall = velocity_[s.i] + gradient * (p.point - points_.position[s.i]);
+      WallRow<dim> &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
+      wall.approach = p.normal.dot(at_wall);
+      source -= wall.laplacian * factor_ * wall.approach;
+    });
+    return source;
+  }
+
+  const Points<dim> &points_;
+  const Cloud<dim> &cloud_;
   VecView<dim> velocity_;
   std::span<const double> target_;
-  double dt_;
+  double factor_;
   PressureProblem<dim> &problem_;
 };
 
@@ -412,38 +429,49 @@ int release_tension(Points<dim> &points, const Walls<dim> &walls, const Pressure
       changed.push_back(i);
     }
   }
-  const Assembler<dim> assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
-                                problem);
+  const OperatorAssembler<dim> operators(points, cloud, params, problem);
+  const SourceAssembler<dim> sources(points, cloud, params, predicted_velocity, target_divergence,
+                                     dt, problem);
+  const auto assemble = [&](int i) {
+    operators.row(i);
+    sources.row(i);
+  };
   for (const int i : changed) {
-    assemble.row(i);
+    assemble(i);
     for (const int j : cloud.neighbours.of(i))
       if (cloud.kind[j] == PointKind::surface)
-        assemble.row(j);
+        assemble(j);
   }
   return static_cast<int>(changed.size());
 }
 
 template <int dim>
-void assemble_pressure(const Points<dim> &points, const Cloud<dim> &cloud,
-                       const PressureParams &params, VecView<dim> predicted_velocity,
-                       std::span<const double> target_divergence, double dt,
-                       PressureProblem<dim> &problem) {
+void assemble_pressure_operators(const Points<dim> &points, const Cloud<dim> &cloud,
+                                 const PressureParams &params, PressureProblem<dim> &problem) {
   lay_out(cloud, problem);
-  const Assembler<dim> assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
-                                problem);
-  const auto counts = block_sums<3>(
+  const OperatorAssembler<dim> assemble(points, cloud, params, problem);
+  const auto counts = block_sums<4>(
       points.size(),
       [&](IndexRange range) {
-        std::array<double, 3> count{};
+        std::array<double, 4> count{};
         for (int i = range.begin; i < range.end; ++i)
           count[static_cast<std::size_t>(assemble.row(i))] += 1;
         return count;
       },
       Work::heavy);
   problem.rows = {static_cast<int>(counts[0]), static_cast<int>(counts[1]),
-                  static_cast<int>(counts[2])};
-  problem.has_open_point = std::any_of(cloud.kind.begin(), cloud.kind.end(),
-                                       [](PointKind kind) { return kind != PointKind::interior; });
+                  static_cast<int>(counts[2]), static_cast<int>(counts[3])};
+  problem.has_open_point = problem.rows.open > 0;
+}
+
+template <int dim>
+void assemble_pressure_source(const Points<dim> &points, const Cloud<dim> &cloud,
+                              const PressureParams &params, VecView<dim> predicted_velocity,
+                              std::span<const double> target_divergence, double dt,
+                              PressureProblem<dim> &problem) {
+  const SourceAssembler<dim> assemble(points, cloud, params, predicted_velocity, target_divergence,
+                                      dt, problem);
+  for_each_point(points.size(), [&](int i) { assemble.row(i); });
 }
 
 template <int dim>
@@ -487,18 +515,24 @@ Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &c
   return gradient;
 }
 
+template void assemble_pressure_operators(const Points<2> &, const Cloud<2> &,
+                                          const PressureParams &, PressureProblem<2> &);
+template void assemble_pressure_source(const Points<2> &, const Cloud<2> &, const PressureParams &,
+                                       VecView<2>, std::span<const double>, double,
+                                       PressureProblem<2> &);
 template int release_tension(Points<2> &, const Walls<2> &, const PressureParams &, VecView<2>,
                              std::span<const double>, double, Cloud<2> &, PressureProblem<2> &);
-template void assemble_pressure(const Points<2> &, const Cloud<2> &, const PressureParams &,
-                                VecView<2>, std::span<const double>, double, PressureProblem<2> &);
 template void set_wall_velocity(const Walls<2> &, const Cloud<2> &, const PressureParams &, double,
                                 PressureProblem<2> &);
 template Vec<2> pressure_gradient(int, const Points<2> &, const Cloud<2> &,
                                   const PressureProblem<2> &, std::span<const double>);
+template void assemble_pressure_operators(const Points<3> &, const Cloud<3> &,
+                                          const PressureParams &, PressureProblem<3> &);
+template void assemble_pressure_source(const Points<3> &, const Cloud<3> &, const PressureParams &,
+                                       VecView<3>, std::span<const double>, double,
+                                       PressureProblem<3> &);
 template int release_tension(Points<3> &, const Walls<3> &, const PressureParams &, VecView<3>,
                              std::span<const double>, double, Cloud<3> &, PressureProblem<3> &);
-template void assemble_pressure(const Points<3> &, const Cloud<3> &, const PressureParams &,
-                                VecView<3>, std::span<const double>, double, PressureProblem<3> &);
 template void set_wall_velocity(const Walls<3> &, const Cloud<3> &, const PressureParams &, double,
                                 PressureProblem<3> &);
 template Vec<3> pressure_gradient(int, const Points<3> &, const Cloud<3> &,

@@ -25,11 +25,17 @@ template <int dim> struct WallRow {
   double datum = 0;                     // g = n . grad p [Pa/m], with the latest wall velocity
 };
 
-/// How the rows were made, for the run report.
+/// How a row of the Laplacian was made.
+enum class RowKind : std::uint8_t {
+  quadratic, // the quadratic fit
+  linear,    // sign guard: renormalised (LDD) Laplacian instead
+  plain,     // sign guard: positive weights without correction
+  open,      // of an open point: no Laplacian
+};
+
+/// Rows of each kind, for the run report.
 struct RowCounts {
-  int quadratic = 0; // the quadratic fit, or the surface row of an open point
-  int linear = 0;    // sign guard: renormalised (LDD) Laplacian instead
-  int plain = 0;     // sign guard: positive weights without correction
+  int quadratic = 0, linear = 0, plain = 0, open = 0;
 };
 
 /// The discrete pressure problem of one step.
@@ -38,6 +44,7 @@ template <int dim> struct PressureProblem {
   std::vector<double> fluid_source;       // right-hand side without the wall velocity
   std::vector<double> source;             // right-hand side with it
   std::vector<Functionals<dim>> gradient; // of the derivatives per point
+  std::vector<RowKind> row_kind;
   std::vector<std::array<WallRow<dim>, most_projections<dim>>> wall_rows; // per wall slot
   std::vector<Mat<dim>> velocity_gradient; // of u* [1/s], row: component
   RowCounts rows;
@@ -45,17 +52,23 @@ template <int dim> struct PressureProblem {
 };
 
 struct PressureParams {
-  double density = 1000;  // [kg/m^3]
-  double row_guard = 0.1; // largest ratio of negative to positive weights in a row
+  double density = 1000;      // [kg/m^3]
+  double row_guard = 0.1;     // largest ratio of negative to positive weights in a row
+  double gradient_guard = 20; // largest norm of a gradient's functional, times the kernel radius
 };
 
-/// Assembles matrix, fluid source and gradient functionals. `target_divergence` [1/s] per point is
-/// the rate at which a cell shall grow (volume control); `dt` [s].
+/// Assembles matrix and gradient functionals, which the cloud alone decides.
 template <int dim>
-void assemble_pressure(const Points<dim> &points, const Cloud<dim> &cloud,
-                       const PressureParams &params, VecView<dim> predicted_velocity,
-                       std::span<const double> target_divergence, double dt,
-                       PressureProblem<dim> &problem);
+void assemble_pressure_operators(const Points<dim> &points, const Cloud<dim> &cloud,
+                                 const PressureParams &params, PressureProblem<dim> &problem);
+
+/// Assembles the fluid source of these operators. `target_divergence` [1/s] per point is the rate
+/// at which a cell shall grow (volume control); `dt` [s].
+template <int dim>
+void assemble_pressure_source(const Points<dim> &points, const Cloud<dim> &cloud,
+                              const PressureParams &params, VecView<dim> predicted_velocity,
+                              std::span<const double> target_divergence, double dt,
+                              PressureProblem<dim> &problem);
 
 /// Water next to air bears no tension: an interior point that touches an open one, or one that was
 /// released in the last step, and whose row would pull its pressure below zero becomes open itself,

@@ -43,6 +43,8 @@ public:
   }
 
   void add(const WallParams &wall) {
+    check(!wall.coupled || wall.velocity.isZero(),
+          "wall '{}': a coupled wall moves as its partner says, not with velocity_m_s", wall.name);
     start(wall.name, wall.condition);
     const int first = static_cast<int>(walls_.position.size());
     const int first_face = static_cast<int>(walls_.faces.size());
@@ -54,6 +56,7 @@ public:
       add_segment(first + (k - 1) * n_z(), first + k * n_z());
     for (int f = first_face; f < static_cast<int>(walls_.faces.size()); ++f)
       walls_.faces[f].number = f - first_face;
+    walls_.velocity.resize(walls_.position.size(), place(wall.velocity, 0));
     if (!wall.coupled)
       return;
     for (int v = first; v < static_cast<int>(walls_.position.size()); ++v)
@@ -79,6 +82,7 @@ public:
       add_face(is_low ? std::array{a, a + 1, a + 2} : std::array{a, a + 2, a + 1});
       add_face(is_low ? std::array{a, a + 2, a + 3} : std::array{a, a + 3, a + 2});
     }
+    walls_.velocity.resize(walls_.position.size(), Vec<3>::Zero());
   }
 
 private:
@@ -117,6 +121,11 @@ private:
       check((wall.points[k] - wall.points[k - 1]).norm() > 1e-9,
             "wall '{}': points {} and {} coincide at {} m", wall.name, k - 1, k,
             text_of(wall.points[k]));
+      const Vec<2> leg = (wall.points[k] - wall.points[k - 1]).normalized();
+      check(std::abs(cross(leg, wall.velocity)) <= 1e-9 * wall.velocity.norm(),
+            "wall '{}': velocity_m_s = [{}, {}] points across the leg from point {} to {}; it may "
+            "only slide along itself",
+            wall.name, wall.velocity.x(), wall.velocity.y(), k - 1, k);
       cut_leg(wall, wall.points[k], outline);
     }
     return outline;
@@ -167,7 +176,6 @@ template <int dim> Walls<dim> read_walls(const Config &config, const FluidParams
   if constexpr (dim == 3)
     if (params.side_walls != "none")
       builder.add_sides(params.side_walls);
-  walls.velocity.assign(walls.position.size(), Vec<dim>::Zero());
   link_faces(walls);
   return walls;
 }
@@ -301,11 +309,31 @@ template <int dim> void check_water(const FluidParams<dim> &params) {
           params.outlet_x);
 }
 
+// Rows along two edges, half a distance inside; a rhombus of 60 degrees gets a triangular lattice.
+std::vector<Vec<2>> lattice_along_edges(const std::vector<Vec<2>> &polygon, double spacing) {
+  check(polygon.size() == 4 &&
+            (polygon[0] + polygon[2] - polygon[1] - polygon[3]).norm() < 1e-6 * spacing,
+        "lattice = \"edges\" needs a parallelogram as water_m");
+  const Vec<2> a = polygon[1] - polygon[0], b = polygon[3] - polygon[0];
+  const double widening = std::sqrt(a.norm() * b.norm() / std::abs(cross(a, b)));
+  const auto count = [&](const Vec<2> &edge) {
+    return std::max(1, static_cast<int>(std::lround(edge.norm() / (widening * spacing))));
+  };
+  const int na = count(a), nb = count(b);
+  std::vector<Vec<2>> points;
+  for (int j = 0; j < nb; ++j)
+    for (int i = 0; i < na; ++i)
+      points.push_back(polygon[0] + (i + 0.5) / na * a + (j + 0.5) / nb * b);
+  return points;
+}
+
 template <int dim> Points<dim> fill(const FluidParams<dim> &params) {
   check_water(params);
   Points<dim> points;
   const std::vector<Vec<2>> section =
-      lattice_in(params.water, params.spacing, params.lattice_angle * std::numbers::pi / 180);
+      params.lattice == "edges"
+          ? lattice_along_edges(params.water, params.spacing)
+          : lattice_in(params.water, params.spacing, params.lattice_angle * std::numbers::pi / 180);
   for (const double z : layers(params))
     for (const Vec<2> &x : section)
       points.position.push_back(at_depth<dim>(x, z));
@@ -315,6 +343,7 @@ template <int dim> Points<dim> fill(const FluidParams<dim> &params) {
   for (auto *v :
        {&points.velocity, &points.previous_velocity, &points.shift, &points.shift_velocity})
     v->assign(n, Vec<dim>::Zero());
+  points.pressure_gradient.assign(n, params.density * params.gravity);
   points.pressure = hydrostatic_pressure(params, points.position);
   points.at_surface.assign(n, SurfaceMemory::enclosed);
   points.id.resize(n);
@@ -366,9 +395,13 @@ int dimension_of(const Config &config) { return config.peek<Dimension>("fluid").
 template <int dim> Scene<dim> read_scene(const Config &config) {
   Scene<dim> scene;
   scene.params = config.read<FluidParams<dim>>("fluid");
+  scene.params.rheology =
+      Rheology(config.read<RheologyParams>("fluid.rheology"), scene.params.viscosity);
   scene.walls = read_walls(config, scene.params);
   scene.gauges = config.read_all<GaugeParams<dim>>("fluid.gauge");
   check_names(scene.gauges, "gauge");
+  scene.probes = config.read_all<ProbeParams<dim>>("fluid.probe");
+  check_names(scene.probes, "probe");
   scene.initial.points = fill(scene.params);
   check_clear_of_walls(scene, 0);
   if (!scene.params.open_sides && scene.params.gravity.norm() > 0)

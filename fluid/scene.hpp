@@ -6,6 +6,7 @@
 #include "bridge/base/config.hpp"
 #include "fluid/motion.hpp"
 #include "fluid/points.hpp"
+#include "fluid/rheology.hpp"
 #include "fluid/walls.hpp"
 
 #include <string>
@@ -22,15 +23,20 @@ template <int dim> struct FluidParams {
   std::vector<Vec<2>> water;
   double depth = 0;
   std::string side_walls = "free-slip";
+  std::string lattice = "square";
   double lattice_angle = 0;
   double outlet_x = 1e300;
   bool open_sides = false;
+  bool free_surface = true;
   std::string coupled_walls = "move";
   std::string start_state;
+  int time_order = 1;
   double pressure_tolerance = 1e-7;
   double row_guard = 0.1;
+  double gradient_guard = 20;
   double noise_damping = 0.5;
   MotionParams motion;
+  Rheology rheology; // from table [fluid.rheology] and `viscosity`
 
   template <class Reader> void describe(Reader &read) {
     int dimension = dim;
@@ -42,6 +48,9 @@ template <int dim> struct FluidParams {
     read("gravity_m_s2", gravity, "acceleration of gravity");
     read.required("water_m", water, "polygon that is filled with points at t = 0")
         .check(water.size() >= 3, "needs at least three corners");
+    read("lattice", lattice,
+         "of the first points: square, or along the edges of a parallelogram water_m")
+        .one_of({"square", "edges"});
     if constexpr (dim == 3) {
       read.required("depth_m", depth, "extent along z, from 0, of what is given in the plane")
           .positive();
@@ -53,21 +62,32 @@ template <int dim> struct FluidParams {
         .at_most(45);
     read("outlet_x_m", outlet_x, "points beyond leave the scene and count as outflow");
     read("open_sides", open_sides, "water may touch air at its sides and below at t = 0");
+    read("free_surface", free_surface, "false: the fluid fills a closed container and has no air")
+        .check(free_surface || outlet_x > 1e299,
+               "has no outlet: outlet_x_m is for water next to air");
     read("coupled_walls", coupled_walls, "what coupled walls do").one_of({"move", "stay"});
     read("start_state", start_state,
          "file fluid_state.h5 of a run to go on from, instead of filling water_m");
+    read("time_order", time_order,
+         "1: each step by itself; 2: backward differences over two, viscosity with the last "
+         "pressure")
+        .at_least(1)
+        .at_most(2);
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")
         .at_least(1e-12)
         .at_most(1e-2);
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
+    read("gradient_guard", gradient_guard,
+         "largest norm of a pressure gradient's functional, times the kernel radius")
+        .positive();
     read("noise_damping", noise_damping,
-         "decay of velocity modes at the scale of the points, in sqrt(g / spacing)")
+         "decay of velocity modes at the scale of the points, in units of the pace")
         .at_least(0);
     read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
         .at_least(0);
     read("agitation", motion.agitation, "disturbance of the points per unit of strain, in spacings")
         .at_least(0);
-    read("volume_rate", motion.volume_rate, "decay of volume errors, in sqrt(g / spacing)")
+    read("volume_rate", motion.volume_rate, "decay of volume errors, in units of the pace")
         .at_least(0);
     read("closest_pair", motion.closest_pair, "closest distance of two points, in spacings")
         .at_least(0)
@@ -85,6 +105,7 @@ struct WallParams {
   std::vector<Vec<2>> points;
   bool coupled = false;
   double segment_length = 0;
+  Vec<2> velocity{0, 0};
 
   template <class Reader> void describe(Reader &read) {
     read.required("name", name, "name of the wall");
@@ -94,6 +115,7 @@ struct WallParams {
         .one_of({"no-slip", "free-slip"});
     read("coupled", coupled, "moves with the partner of the bridge");
     read("segment_length_m", segment_length, "longest segment; 0 keeps the given ones").at_least(0);
+    read("velocity_m_s", velocity, "of a wall that slides along itself, as a lid does");
   }
 };
 
@@ -110,10 +132,25 @@ template <int dim> struct GaugeParams {
   }
 };
 
+/// Table [[fluid.probe]]: places along a line.
+template <int dim> struct ProbeParams {
+  std::string name;
+  Vec<dim> from = Vec<dim>::Zero(), to = Vec<dim>::Zero();
+  int samples = 1;
+
+  template <class Reader> void describe(Reader &read) {
+    read.required("name", name, "name of the probe: letters, digits, _ and -");
+    read.required("from_m", from, "first place");
+    read.required("to_m", to, "last place");
+    read("samples", samples, "number of places, ends included").at_least(1).at_most(1e6);
+  }
+};
+
 template <int dim> struct Scene {
   FluidParams<dim> params;
   Walls<dim> walls;
   std::vector<GaugeParams<dim>> gauges;
+  std::vector<ProbeParams<dim>> probes;
   FluidState<dim> initial;
 };
 

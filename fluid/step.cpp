@@ -15,21 +15,28 @@ FluidSolver<dim>::FluidSolver(const Scene<dim> &scene)
     : state(scene.initial), walls(scene.walls), params_(scene.params) {
   pressure_params_.density = params_.density;
   pressure_params_.row_guard = params_.row_guard;
+  pressure_params_.gradient_guard = params_.gradient_guard;
+  cloud_.has_air = params_.free_surface;
   nodal_forces_.assign(walls.position.size(), Vec<dim>::Zero());
 }
 
 template <int dim> void FluidSolver<dim>::begin_step(double dt) {
   dt_ = dt;
   report_ = {};
+  pace_ = pace_of(state.points, params_.gravity.norm(), params_.spacing);
   timer("move", [&] { move_points(state.points, dt, state.step_size); });
   freeze_cloud();
+  timer("operators", [&] {
+    assemble_pressure_operators(state.points, cloud_, pressure_params_, problem_);
+    report_.rows = problem_.rows;
+  });
   timer("viscosity", [&] { predict_velocity(); });
   assemble();
 }
 
 template <int dim> void FluidSolver<dim>::iterate() {
   Points<dim> &points = state.points;
-  set_wall_velocity(walls, cloud_, pressure_params_, dt_, problem_);
+  set_wall_velocity(walls, cloud_, pressure_params_, projection_dt_, problem_);
   const SolveResult result = timer("pressure solve", [&] {
     SolveOptions options;
     options.relative_tolerance = params_.pressure_tolerance;
@@ -43,8 +50,8 @@ template <int dim> void FluidSolver<dim>::iterate() {
   report_.pressure_iterations += result.iterations;
   ++report_.pressure_solves;
   timer("loads", [&] {
-    evaluate_tractions(points, walls, cloud_, problem_, points.pressure, params_.viscosity,
-                       quadrature_, tractions_);
+    evaluate_tractions(points, walls, cloud_, problem_, points.pressure, viscosity(), quadrature_,
+                       tractions_);
     integrate_nodal_forces(walls, quadrature_, tractions_, nodal_forces_);
   });
 }
@@ -52,15 +59,14 @@ template <int dim> void FluidSolver<dim>::iterate() {
 template <int dim> void FluidSolver<dim>::end_step() {
   Points<dim> &points = state.points;
   timer("project", [&] {
-    const double factor = dt_ / params_.density;
+    const double factor = projection_dt_ / params_.density;
     for_each_point(points.size(), [&](int i) {
+      points.pressure_gradient[i] = pressure_gradient(i, points, cloud_, problem_, points.pressure);
       points.previous_velocity[i] = points.velocity[i];
-      points.velocity[i] =
-          predicted_[i] - factor * pressure_gradient(i, points, cloud_, problem_, points.pressure);
+      points.velocity[i] = predicted_[i] - factor * points.pressure_gradient[i];
     });
-    const double rate = params_.noise_damping * std::sqrt(params_.gravity.norm() / params_.spacing);
-    damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient, rate, dt_,
-                     points.velocity);
+    damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient,
+                     params_.noise_damping * pace_, dt_, points.velocity);
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
   });
   ++state.step;
@@ -149,28 +155,57 @@ template <int dim> void FluidSolver<dim>::freeze_cloud() {
   timer("cells", [&] { update_cells(points, cloud_); });
 }
 
+// The velocity from which the step's forces act over projection_dt_: that of the last step, or of
+// the last two by backward differences of second order (steps of unequal length: ratio r).
+template <int dim> void FluidSolver<dim>::extrapolate_velocity() {
+  const Points<dim> &points = state.points;
+  const bool is_second_order = params_.time_order == 2 && state.step > 0;
+  const double r = is_second_order ? dt_ / state.step_size : 0;
+  const double now = (1 + r) * (1 + r) / (1 + 2 * r), before = r * r / (1 + 2 * r);
+  projection_dt_ = dt_ * (1 + r) / (1 + 2 * r);
+  predicted_.resize(points.size());
+  for_each_point(points.size(), [&](int i) {
+    predicted_[i] = now * points.velocity[i] - before * points.previous_velocity[i];
+  });
+}
+
+// Viscosity acts on a velocity that knows the pressure: in the first-order scheme that of water at
+// rest, so that it stays at rest; in the second-order one that of the last step.
 template <int dim> void FluidSolver<dim>::predict_velocity() {
-  Points<dim> &points = state.points;
-  const double nu = params_.viscosity / params_.density;
-  predicted_.assign(points.velocity.begin(), points.velocity.end());
-  if (nu > 0)
-    report_.viscous_iterations =
-        diffuse_velocity(points, walls, cloud_, nu, dt_, predicted_, viscous_, memory_);
-  for_each_point(points.size(), [&](int i) { predicted_[i] += dt_ * params_.gravity; });
+  const Points<dim> &points = state.points;
+  extrapolate_velocity();
+  const bool knows_pressure = params_.time_order == 2;
+  const auto unbalanced = [&](int i) -> Vec<dim> {
+    return params_.gravity - points.pressure_gradient[i] / params_.density;
+  };
+  if (!params_.rheology.is_inviscid()) {
+    if (knows_pressure)
+      for_each_point(points.size(),
+                     [&](int i) { predicted_[i] += projection_dt_ * unbalanced(i); });
+    build_viscous_rows(points, cloud_, problem_, viscous_);
+    const ViscousResult result =
+        diffuse_velocity(points, walls, cloud_, params_.rheology, params_.density, projection_dt_,
+                         predicted_, viscous_);
+    report_.viscous_iterations = result.iterations;
+    report_.viscous_passes = result.passes;
+    report_.viscous_rows = viscous_.rows;
+    if (knows_pressure)
+      for_each_point(points.size(),
+                     [&](int i) { predicted_[i] -= projection_dt_ * unbalanced(i); });
+  }
+  for_each_point(points.size(), [&](int i) { predicted_[i] += projection_dt_ * params_.gravity; });
 }
 
 template <int dim> void FluidSolver<dim>::assemble() {
   Points<dim> &points = state.points;
   timer("operators", [&] {
     target_divergence_.resize(points.size());
-    volume_restoring_divergence(points, cloud_, params_.motion, params_.gravity.norm(),
-                                target_divergence_);
-    assemble_pressure(points, cloud_, pressure_params_, predicted_, target_divergence_, dt_,
-                      problem_);
-    report_.rows = problem_.rows;
+    volume_restoring_divergence(points, cloud_, params_.motion, pace_, target_divergence_);
+    assemble_pressure_source(points, cloud_, pressure_params_, predicted_, target_divergence_,
+                             projection_dt_, problem_);
     if (state.step > 0) // the first step has no pressure to judge by
       report_.released = release_tension(points, walls, pressure_params_, predicted_,
-                                         target_divergence_, dt_, cloud_, problem_);
+                                         target_divergence_, projection_dt_, cloud_, problem_);
   });
   timer("pressure set-up", [&] {
     std::vector<Cell> cells(points.size());

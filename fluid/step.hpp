@@ -22,6 +22,8 @@ template <int dim> struct StepReport {
   RowCounts rows;
   int pressure_iterations = 0; // over all coupling iterations of the step
   int viscous_iterations = 0;
+  int viscous_passes = 0; // over the viscosity law; 0: explicit
+  ViscousRowCounts viscous_rows;
   int pressure_solves = 0;
   Vec<dim> contact_impulse = Vec<dim>::Zero(); // of walls on the points that touched them [N s/m]
   int released = 0;                            // points that bear no tension next to air
@@ -48,6 +50,8 @@ public:
   const WallQuadrature<dim> &quadrature() const { return quadrature_; }
   const Cloud<dim> &cloud() const { return cloud_; }
   const PressureProblem<dim> &problem() const { return problem_; }
+  /// Dynamic viscosity per point [Pa s]; empty in an inviscid fluid.
+  std::span<const double> viscosity() const { return viscous_.viscosity; }
   const StepReport<dim> &report() const { return report_; }
   const FluidParams<dim> &params() const { return params_; }
   double dt() const { return dt_; }
@@ -60,12 +64,15 @@ private:
   double mass_of_point() const;
   double energy_of_point(const Vec<dim> &u, const Vec<dim> &x) const;
   void freeze_cloud();
+  void extrapolate_velocity();
   void predict_velocity();
   void assemble();
 
   FluidParams<dim> params_;
   PressureParams pressure_params_;
-  double dt_ = 0;
+  double dt_ = 0;            // [s], of the step
+  double projection_dt_ = 0; // [s], over which the forces of the step act on predicted_
+  double pace_ = 0;          // [1/s], of what happens at the scale of the points
   Cloud<dim> cloud_;
   PressureProblem<dim> problem_;
   ViscousProblem<dim> viscous_;

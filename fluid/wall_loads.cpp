@@ -141,7 +141,7 @@ void build_wall_quadrature(const Points<dim> &points, const Walls<dim> &walls,
 template <int dim>
 void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud,
                         const PressureProblem<dim> &problem, std::span<const double> pressure,
-                        double viscosity, const WallQuadrature<dim> &quadrature,
+                        std::span<const double> viscosity, const WallQuadrature<dim> &quadrature,
                         std::vector<Vec<dim>> &traction) {
   std::vector<Vec<dim>> gradient(quadrature.feeders.size());
   for_each_index(static_cast<int>(gradient.size()), [&](int f) {
@@ -151,7 +151,7 @@ void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, cons
   for_each_index(static_cast<int>(traction.size()), [&](int k) {
     const typename WallQuadrature<dim>::Sample &s = quadrature.samples[k];
     const Vec<dim> wall_velocity = value_at<dim>(walls.velocity, walls.faces[s.face], s.shape);
-    const double face_viscosity = walls.slips(s.face) ? 0.0 : viscosity;
+    const bool slips = walls.slips(s.face);
     double p = 0;
     Vec<dim> shear = Vec<dim>::Zero();
     for (int c = s.first; c < s.first + s.count; ++c) {
@@ -159,9 +159,11 @@ void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, cons
       const int i = quadrature.feeders[feeder];
       const Vec<dim> r = s.position - points.position[i];
       p += w * (pressure[i] + gradient[feeder].dot(r));
+      if (viscosity.empty() || slips)
+        continue;
       const Vec<dim> slip = points.velocity[i] - wall_velocity;
       const double distance = std::max(r.dot(s.normal), 0.25 * cloud.spacing);
-      shear += w * face_viscosity / distance * (slip - slip.dot(s.normal) * s.normal);
+      shear += w * viscosity[i] / distance * (slip - slip.dot(s.normal) * s.normal);
     }
     traction[k] = p * s.normal + shear;
   });
@@ -192,16 +194,18 @@ Resultant<dim> integrate_resultant(const WallQuadrature<dim> &quadrature, VecVie
 template void build_wall_quadrature(const Points<2> &, const Walls<2> &, const Cloud<2> &, WallPart,
                                     WallQuadrature<2> &);
 template void evaluate_tractions(const Points<2> &, const Walls<2> &, const Cloud<2> &,
-                                 const PressureProblem<2> &, std::span<const double>, double,
-                                 const WallQuadrature<2> &, std::vector<Vec<2>> &);
+                                 const PressureProblem<2> &, std::span<const double>,
+                                 std::span<const double>, const WallQuadrature<2> &,
+                                 std::vector<Vec<2>> &);
 template void integrate_nodal_forces(const Walls<2> &, const WallQuadrature<2> &, VecView<2>,
                                      VecSpan<2>);
 template Resultant<2> integrate_resultant(const WallQuadrature<2> &, VecView<2>);
 template void build_wall_quadrature(const Points<3> &, const Walls<3> &, const Cloud<3> &, WallPart,
                                     WallQuadrature<3> &);
 template void evaluate_tractions(const Points<3> &, const Walls<3> &, const Cloud<3> &,
-                                 const PressureProblem<3> &, std::span<const double>, double,
-                                 const WallQuadrature<3> &, std::vector<Vec<3>> &);
+                                 const PressureProblem<3> &, std::span<const double>,
+                                 std::span<const double>, const WallQuadrature<3> &,
+                                 std::vector<Vec<3>> &);
 template void integrate_nodal_forces(const Walls<3> &, const WallQuadrature<3> &, VecView<3>,
                                      VecSpan<3>);
 template Resultant<3> integrate_resultant(const WallQuadrature<3> &, VecView<3>);

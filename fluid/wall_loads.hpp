@@ -47,11 +47,12 @@ void build_wall_quadrature(const Points<dim> &points, const Walls<dim> &walls,
                            const Cloud<dim> &cloud, WallPart part, WallQuadrature<dim> &quadrature);
 
 /// Tractions at the samples [Pa]: pressure times the normal, and viscous shear with the tangential
-/// velocity difference to the wall over the distance, unless the wall slips.
+/// velocity difference to the wall over the distance, unless the wall slips. `viscosity` [Pa s] per
+/// point; none without.
 template <int dim>
 void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud,
                         const PressureProblem<dim> &problem, std::span<const double> pressure,
-                        double viscosity, const WallQuadrature<dim> &quadrature,
+                        std::span<const double> viscosity, const WallQuadrature<dim> &quadrature,
                         std::vector<Vec<dim>> &traction);
 
 /// Consistent nodal forces [N/m] on all wall vertices: sum of traction times linear shape function.

@@ -141,7 +141,13 @@ Projection<dim> make_projection(const Walls<dim> &walls, int face, const Foot<di
   const Vec<dim> normal = !foot.part.is_inside() && length > 1e-12
                               ? Vec<dim>(-sign * offset / length)
                               : Vec<dim>(-side.normalized());
-  return {foot.point, normal, sign * length, foot.shape, face, is_sharp(walls, face, foot.part)};
+  return {foot.point,
+          normal,
+          sign * length,
+          foot.shape,
+          face,
+          walls.slips(face),
+          is_sharp(walls, face, foot.part)};
 }
 
 // Candidates of one point, nearest first: their order on the outlines has no influence.

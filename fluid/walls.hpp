@@ -68,6 +68,7 @@ template <int dim> struct Projection {
   double distance;  // [m], negative when the fluid point is behind the wall
   Shape<dim> shape; // of the face's vertices
   int face;
+  bool slips;   // the wall lets fluid glide along it
   bool at_edge; // on a sharp edge (turning by more than 30 degrees) or an open one: flow leaves
 };
 

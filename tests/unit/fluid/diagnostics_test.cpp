@@ -29,12 +29,12 @@ TEST(CentreLine, OfABentGateTellsTheTankFromTheOutside) {
   EXPECT_NEAR((line.tip() - Vec<2>(0.1425, 0.01)).norm(), 0, 1e-12);
   const double middle = 0.1025 + 0.04 * 0.5; // at half height of the gate
   const double y = 0.5 * (0.079 + 0.01);
-  EXPECT_FALSE(line.is_past({middle - 1e-4, y}));
-  EXPECT_TRUE(line.is_past({middle + 1e-4, y}));
-  EXPECT_FALSE(line.is_past({0.1424, 0.005})); // below the tip
-  EXPECT_TRUE(line.is_past({0.1426, 0.005}));
-  EXPECT_FALSE(line.is_past({0.09, 0.12})); // above the clamp
-  EXPECT_TRUE(line.is_past({0.11, 0.12}));
+  EXPECT_FALSE(line.is_past(Vec<2>(middle - 1e-4, y)));
+  EXPECT_TRUE(line.is_past(Vec<2>(middle + 1e-4, y)));
+  EXPECT_FALSE(line.is_past(Vec<2>(0.1424, 0.005))); // below the tip
+  EXPECT_TRUE(line.is_past(Vec<2>(0.1426, 0.005)));
+  EXPECT_FALSE(line.is_past(Vec<2>(0.09, 0.12))); // above the clamp
+  EXPECT_TRUE(line.is_past(Vec<2>(0.11, 0.12)));
 }
 
 TEST(WaterLevel, IsTheTopOfTheConnectedColumnAndIgnoresDropsAboveIt) {

@@ -33,7 +33,8 @@ struct Problem {
     params.density = density;
     params.row_guard = guard;
     predicted = frozen.values(velocity);
-    assemble_pressure(frozen.points, frozen.cloud, params, predicted, target, dt, pressure);
+    assemble_pressure_operators(frozen.points, frozen.cloud, params, pressure);
+    assemble_pressure_source(frozen.points, frozen.cloud, params, predicted, target, dt, pressure);
     set_wall_velocity(frozen.walls, frozen.cloud, params, dt, pressure);
   }
   double row_times(int i, const std::vector<double> &p) const {
@@ -193,7 +194,8 @@ TEST(Pressure, DiagonalsArePositiveAndInteriorRowsSumToZero) {
 // --- with the solver ------------------------------------------------------------------------
 
 TEST(PressureSolve, StillWaterHasHydrostaticPressureAndNoAccelerationAtEveryPoint) {
-  FluidSolver<2> solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
+  FluidSolver<2> solver(
+      testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
   solver.begin_step(1e-3);
   solver.iterate();
   const Points<2> &points = solver.state.points;
@@ -231,7 +233,8 @@ TEST(PressureSolve, LeavesTheResidualThatItWasAskedFor) {
 }
 
 TEST(PressureSolve, WallVelocityEntersTheRightHandSideAloneAndAffinely) {
-  FluidSolver<2> solver(testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
+  FluidSolver<2> solver(
+      testing::scene_of(testing::gate_tank(), {"fluid.pressure_tolerance=1e-12"}));
   solver.begin_step(1e-3);
   const auto matrix = solver.problem().matrix.value;
   const auto fluid_source = solver.problem().fluid_source;
@@ -260,6 +263,41 @@ TEST(PressureSolve, WallVelocityEntersTheRightHandSideAloneAndAffinely) {
   std::printf("affine to %.1e of %.1e Pa\n", error, size);
   EXPECT_GT(size, 10);
   EXPECT_LT(error, 1e-8 * size);
+}
+
+// --- in space -----------------------------------------------------------------------------------
+
+TEST(PressureInSpace, GradientAndRowsAreExactForQuadraticFieldsUpToTheWalls) {
+  const Vec<3> size(0.8, 0.7, 0.6);
+  const testing::FrozenCloudIn<3> frozen(testing::lattice({8, 7, 6}, h, 0.15),
+                                         testing::box_of_triangles(size), h);
+  Mat<3> curvature;
+  curvature << 1, -1.5, 0.5, -1.5, 2, -0.7, 0.5, -0.7, -1;
+  const Vec<3> slope(1, -2, 0.5);
+  const auto field = [&](const Vec<3> &x) { return slope.dot(x) + x.dot(curvature * x); };
+  const auto gradient = [&](const Vec<3> &x) { return Vec<3>(slope + 2 * curvature * x); };
+  PressureParams params;
+  params.density = density;
+  params.row_guard = no_guard;
+  PressureProblem<3> problem;
+  const std::vector<Vec<3>> predicted =
+      frozen.values([&](const Vec<3> &x) { return Vec<3>(dt / density * gradient(x)); });
+  const std::vector<double> target(frozen.size(), 0), p = frozen.values(field);
+  assemble_pressure_operators(frozen.points, frozen.cloud, params, problem);
+  assemble_pressure_source<3>(frozen.points, frozen.cloud, params, predicted, target, dt, problem);
+  set_wall_velocity(frozen.walls, frozen.cloud, params, dt, problem);
+  int exact_rows = 0;
+  for (int i = 0; i < frozen.size(); ++i) {
+    double defect = -problem.source[i];
+    for (int k = problem.matrix.row_start[i]; k < problem.matrix.row_start[i + 1]; ++k)
+      defect += problem.matrix.value[k] * p[problem.matrix.column[k]];
+    const Vec<3> found = pressure_gradient(i, frozen.points, frozen.cloud, problem, p);
+    exact_rows +=
+        (found - gradient(frozen.points.position[i])).norm() < 1e-9 && std::abs(defect) < 1e-9;
+  }
+  std::printf("%d of %d rows exact for quadratics in space\n", exact_rows, frozen.size());
+  EXPECT_GE(exact_rows, problem.rows.quadratic);
+  EXPECT_GE(problem.rows.quadratic, 0.9 * frozen.size());
 }
 
 } // namespace

@@ -99,7 +99,7 @@ TEST(StateFile, AMissingFileAFolderAndATextAreRefusedByName) {
 TEST(StateFile, EveryTruncationIsRefused) {
   const TemporaryFolder folder;
   const auto file = folder.path() / "state.h5";
-  write_state(file, {state_after(1), 5e-4, 0.004});
+  write_state<2>(file, {state_after(1), 5e-4, 0.004});
   const auto size = std::filesystem::file_size(file);
   for (int k = 0; k < 40; ++k) {
     const auto cut = folder.path() / "cut.h5";

@@ -85,10 +85,10 @@ TEST(Walls, AMildlyConvexPolylineGivesOneProjectionEverywhere) {
 // Four walls around a point, three places: the nearest three, whatever the order of the segments.
 TEST(Walls, TheNearestThreeDirectionsDoNotDependOnTheOrderOfTheSegments) {
   Walls<2> walls;
-  testing::add_polyline(walls, {{0.4, 2}, {0.4, -2}}, "left");   // 0.1 away
-  testing::add_polyline(walls, {{-2, 0.3}, {2, 0.3}}, "below");  // 0.2
-  testing::add_polyline(walls, {{0.8, -2}, {0.8, 2}}, "right");  // 0.3
-  testing::add_polyline(walls, {{2, 0.9}, {-2, 0.9}}, "above");  // 0.4
+  testing::add_polyline(walls, {{0.4, 2}, {0.4, -2}}, "left");            // 0.1 away
+  testing::add_polyline(walls, {{-2, 0.3}, {2, 0.3}}, "below");           // 0.2
+  testing::add_polyline(walls, {{0.8, -2}, {0.8, 2}}, "right");           // 0.3
+  testing::add_polyline(walls, {{2, 0.9}, {-2, 0.9}}, "above");           // 0.4
   testing::add_polyline(walls, {{0.35, 2}, {0.35, -2}}, "left, farther"); // 0.15
   const Vec<2> x(0.5, 0.5);
   std::vector<int> order = every_face(walls);
@@ -172,6 +172,74 @@ TEST(Walls, LinkingRefusesTwoWallsThatRunAgainstEachOther) {
   testing::add_polyline(walls, {{0, 1}, {0, 0}}, "left");
   testing::add_polyline(walls, {{1, 0}, {0, 0}}, "floor");
   EXPECT_NE(testing::message_of([&] { link_faces(walls); }), "");
+}
+
+// --- in space -----------------------------------------------------------------------------------
+
+TEST(WallsInSpace, ACornerOfABoxGivesThreeProjectionsNearestFirstAndTheDiagonalsNone) {
+  const Walls<3> box = testing::box_of_triangles({4, 3, 2});
+  const PointWalls<3> found = project_on_walls<3>(box, every_face(box), {0.3, 0.5, 0.2}, 1);
+  ASSERT_EQ(found.count, 3);
+  const double distance[] = {0.2, 0.3, 0.5};
+  const Vec<3> normal[] = {{0, 0, -1}, {-1, 0, 0}, {0, -1, 0}};
+  for (int k = 0; k < 3; ++k) {
+    EXPECT_NEAR(found.projection[k].distance, distance[k], round_off);
+    EXPECT_NEAR((found.projection[k].normal - normal[k]).norm(), 0, round_off);
+    EXPECT_FALSE(found.projection[k].at_edge);
+  }
+}
+
+TEST(WallsInSpace, OnTheDiagonalOfAWallThereIsOneProjectionAndNoEdge) {
+  const Walls<3> box = testing::box_of_triangles({1, 1, 1});
+  for (const double t : {0.5, 0.3, 0.7}) // the floor z = 0 is split from (0, 0) to (1, 1)
+    for (const double z : {0.1, -0.1}) {
+      const PointWalls<3> found = project_on_walls<3>(box, every_face(box), {t, t, z}, 0.15);
+      ASSERT_EQ(found.count, 1);
+      EXPECT_NEAR(found.projection[0].distance, z, round_off);
+      EXPECT_FALSE(found.projection[0].at_edge);
+    }
+}
+
+// Outside of a box the nearest point is known: the box is where the coordinates are clamped to.
+TEST(WallsInSpace, AroundABoxThereIsOneProjectionEverywhereAndEdgesAndCornersAreSharp) {
+  const Vec<3> size(1, 2, 3);
+  const Walls<3> box = testing::box_of_triangles(size, testing::Box::obstacle);
+  std::mt19937 engine(5);
+  std::uniform_real_distribution<double> uniform(-0.4, 1.4);
+  int sharp = 0;
+  for (int n = 0; n < 2000; ++n) {
+    const double a = uniform(engine), b = uniform(engine), c = uniform(engine);
+    const Vec<3> x = Vec<3>(a, b, c).cwiseProduct(size);
+    const Vec<3> foot = x.cwiseMax(0).cwiseMin(size);
+    if ((x - foot).norm() < 1e-3)
+      continue;
+    const PointWalls<3> found = project_on_walls<3>(box, every_face(box), x, 3);
+    ASSERT_GE(found.count, 1);
+    EXPECT_NEAR((found.projection[0].point - foot).norm(), 0, 1e-12);
+    EXPECT_NEAR(found.projection[0].distance, (x - foot).norm(), 1e-12);
+    const int outside = ((x - foot).array() != 0).count();
+    EXPECT_EQ(found.projection[0].at_edge, outside > 1);
+    sharp += outside > 1;
+  }
+  EXPECT_GT(sharp, 100);
+}
+
+TEST(WallsInSpace, LinkingRefusesAFaceThatIsTurnedRoundAndNamesIt) {
+  Walls<3> box = testing::box_of_triangles({1, 1, 1});
+  std::swap(box.faces[7].vertex[1], box.faces[7].vertex[2]);
+  const std::string message = testing::message_of([&] { link_faces(box); });
+  EXPECT_TRUE(testing::contains(message, "face 7 of wall 'box'")) << message;
+  EXPECT_TRUE(testing::contains(message, "turned against")) << message;
+}
+
+TEST(WallsInSpace, LinkingRefusesAThirdFaceAtAnEdge) {
+  Walls<3> box = testing::box_of_triangles({1, 1, 1});
+  box.position.emplace_back(0.5, 0.5, 3);
+  box.velocity.emplace_back(0, 0, 0);
+  box.faces.push_back({{0, 1, 8}, 0, 12});
+  const std::string message = testing::message_of([&] { link_faces(box); });
+  EXPECT_TRUE(testing::contains(message, "more than two faces meet")) << message;
+  EXPECT_TRUE(testing::contains(message, "face 12")) << message;
 }
 
 } // namespace
