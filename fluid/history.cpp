@@ -33,6 +33,8 @@ History::History(const Scene &scene, const FluidSolver &solver, std::filesystem:
       loads_(folder_ / "fluid_loads.csv", "window,time_s,fx_n,fy_n,moment_nm,magnitude_n,"
                                           "moment_magnitude_nm,work_j,work_magnitude_j"),
       points_(folder_), walls_(folder_), output_interval_(output_interval), last_time_(time) {
+  for (const ProbeParams &probe : scene.probes)
+    probes_.emplace_back(probe, folder_);
   const Points &points = solver.state.points;
   start_ = integrate(solver.state, scene.params);
   double lowest = -1e300;
@@ -58,7 +60,7 @@ Vec<2> History::force_on_all_walls(const FluidSolver &solver) {
   const Points &points = solver.state.points;
   build_wall_quadrature(points, solver.walls, solver.cloud(), WallPart::all, all_walls_);
   evaluate_tractions(points, solver.walls, solver.cloud(), solver.problem(), points.pressure,
-                     solver.params().viscosity, all_walls_, all_tractions_);
+                     solver.viscosity(), all_walls_, all_tractions_);
   return integrate_resultant(all_walls_, all_tractions_).force;
 }
 
@@ -75,6 +77,8 @@ void History::update_extremes(const FluidSolver &solver, const Integrals &now) {
   guarded_rows_ += solver.report().rows.linear + solver.report().rows.plain;
   pressure_iterations_ += solver.report().pressure_iterations;
   pressure_solves_ += solver.report().pressure_solves;
+  viscous_passes_ += solver.report().viscous_passes;
+  viscous_iterations_ += solver.report().viscous_iterations;
   ++steps_;
 }
 
@@ -110,8 +114,11 @@ void History::record(const FluidSolver &solver, const bridge::InterfaceTotals &l
 void History::write_fields(const FluidSolver &solver, double time) {
   if (output_interval_ <= 0 || time < next_output_ - 1e-9 * output_interval_)
     return;
-  points_.write(solver.state.points, solver.cloud(), solver.state.step, time);
+  points_.write(solver, time);
   walls_.write(solver.walls, solver.state.step, time);
+  if (solver.state.points.size() == static_cast<int>(solver.cloud().kind.size()))
+    for (ProbeOutput &probe : probes_) // not before the first step
+      probe.write(solver, time);
   write_state_file(solver, time);
   next_output_ += output_interval_ * std::ceil((time - next_output_) / output_interval_ + 1e-6);
 }
@@ -151,6 +158,13 @@ void History::write_summary(const FluidSolver &solver, const std::string &messag
   summary["guarded_rows_per_step"] = static_cast<double>(guarded_rows_) / n;
   summary["pressure_iterations_per_solve"] =
       static_cast<double>(pressure_iterations_) / std::max(1L, pressure_solves_);
+  summary["viscous_passes_per_step"] = static_cast<double>(viscous_passes_) / n;
+  summary["viscous_iterations_per_step"] = static_cast<double>(viscous_iterations_) / n;
+  const ViscousRowCounts &rows = solver.report().viscous_rows;
+  summary["viscous_rows_last_step"] = {{"quadratic", rows.quadratic},
+                                       {"linear", rows.linear},
+                                       {"surface", rows.surface},
+                                       {"pairs", rows.pairs}};
   summary["volume_drift_max"] = volume_drift_max_;
   if (steps_ > 0 && energy_scale_ > 0) {
     summary["energy_gain_max"] = energy_gain_max_ / energy_scale_;

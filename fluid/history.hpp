@@ -7,6 +7,7 @@
 #include "bridge/base/csv.hpp"
 #include "fluid/diagnostics.hpp"
 #include "fluid/output_vtk.hpp"
+#include "fluid/probe.hpp"
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
@@ -39,6 +40,7 @@ private:
   std::filesystem::path folder_;
   std::vector<GaugeParams> gauges_;
   CsvWriter series_, loads_;
+  std::vector<ProbeOutput> probes_;
   PointOutput points_;
   WallOutput walls_;
   double output_interval_, next_output_ = 0;
@@ -47,6 +49,7 @@ private:
   // running sums
   double work_on_walls_ = 0, outlet_energy_ = 0, start_outlet_energy_ = 0, last_time_ = 0;
   Integrals start_, last_;
+  long viscous_passes_ = 0, viscous_iterations_ = 0;
   long guarded_rows_ = 0, steps_ = 0, pressure_iterations_ = 0, pressure_solves_ = 0;
   double energy_scale_ = 0; // [J/m], kinetic and potential above the lowest point at the start
   double volume_drift_max_ = 0, energy_gain_max_ = -1e300;

@@ -90,11 +90,19 @@ ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const Moti
   return {static_cast<int>(sums[0]), static_cast<int>(sums[1]), {sums[2], sums[3]}};
 }
 
+double pace_of(const Points &points, double gravity, double spacing) {
+  if (gravity > 0)
+    return std::sqrt(gravity / spacing);
+  const double speed2 =
+      sum(points.size(), [&](int i) { return points.velocity[i].squaredNorm(); });
+  return std::sqrt(speed2 / std::max(points.size(), 1)) / spacing;
+}
+
 void volume_restoring_divergence(const Points &points, const Cloud &cloud,
-                                 const MotionParams &params, double gravity,
+                                 const MotionParams &params, double pace,
                                  std::span<double> divergence) {
   const double volume = cloud.spacing * cloud.spacing;
-  const double rate = params.volume_rate * std::sqrt(gravity / cloud.spacing);
+  const double rate = params.volume_rate * pace;
   constexpr double largest_error = 0.3;
   for_each_point(points.size(), [&](int i) {
     divergence[i] = 0;

@@ -18,7 +18,7 @@ struct MotionParams {
   /// (dimensionless). A lattice that the flow stretches is a fixed point of the regularisation,
   /// though an unstable one; without a disturbance it stays a lattice until its rows part.
   double agitation = 0.05;
-  /// Volume errors decay at this multiple of sqrt(g / spacing) (dimensionless).
+  /// Volume errors decay at this multiple of the flow's pace (dimensionless).
   double volume_rate = 0.3;
   /// No pair of points stays closer than this many spacings.
   double closest_pair = 0.7;
@@ -45,10 +45,14 @@ ContactCounts keep_clear_of_walls(Points &points, const Walls &walls, const Moti
                                   const Cloud &cloud);
 
 /// Divergence that brings the cells back to their volume [1/s], zero at the free surface: the
-/// relative volume error, averaged over the neighbours, times volume_rate sqrt(g / spacing).
+/// relative volume error, averaged over the neighbours, times volume_rate and `pace` [1/s].
 void volume_restoring_divergence(const Points &points, const Cloud &cloud,
-                                 const MotionParams &params, double gravity,
+                                 const MotionParams &params, double pace,
                                  std::span<double> divergence);
+
+/// How fast things happen at the scale of the points [1/s]: sqrt(g / spacing), the frequency of the
+/// shortest wave; without gravity the rms speed over the spacing.
+double pace_of(const Points &points, double gravity, double spacing);
 
 /// Regularisation to be applied in the next move: towards the cell's centroid at a rate
 /// proportional to the local strain rate (along the surface only, at the free surface), and apart

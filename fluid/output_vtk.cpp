@@ -84,7 +84,9 @@ vtkNew<vtkCellArray> one_vertex_per_point(std::size_t n) {
 
 } // namespace
 
-void PointOutput::write(const Points &points, const Cloud &cloud, std::int64_t step, double time) {
+void PointOutput::write(const FluidSolver &solver, double time) {
+  const Points &points = solver.state.points;
+  const Cloud &cloud = solver.cloud();
   vtkNew<vtkPolyData> data;
   const std::size_t n = points.position.size();
   const bool is_frozen = cloud.kind.size() == n; // not before the first step
@@ -99,7 +101,11 @@ void PointOutput::write(const Points &points, const Cloud &cloud, std::int64_t s
   add_array<vtkFloatArray>(data->GetPointData(), "volume", n,
                            [&](std::size_t i) { return is_frozen ? cloud.cell_area[i] : 0.0; });
   add_vectors(data->GetPointData(), "velocity", points.velocity);
-  const auto file = next_file(step);
+  if (const auto viscosity = solver.viscosity();
+      viscosity.size() == n && !solver.params().rheology.is_newtonian())
+    add_array<vtkFloatArray>(data->GetPointData(), "viscosity", n,
+                             [&](std::size_t i) { return viscosity[i]; });
+  const auto file = next_file(solver.state.step);
   write_file(file, data);
   written(file, time);
 }

@@ -27,11 +27,12 @@ private:
   std::vector<std::pair<double, std::string>> entries_;
 };
 
-/// fluid_*.vtp: points with pressure [Pa], velocity [m/s], kind (0 interior, 1 surface, 2 thin), id.
+/// fluid_*.vtp: points with pressure [Pa], velocity [m/s], kind (0 interior, 1 surface, 2 thin), id,
+/// volume [m^2] and, where it varies, viscosity [Pa s].
 class PointOutput : VtkSeries {
 public:
   explicit PointOutput(const std::filesystem::path &folder) : VtkSeries(folder, "fluid") {}
-  void write(const Points &points, const Cloud &cloud, std::int64_t step, double time);
+  void write(const FluidSolver &solver, double time);
 };
 
 /// wall_*.vtp: segments with velocity [m/s] and the number of their wall.

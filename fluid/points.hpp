@@ -20,6 +20,7 @@ struct Points {
   std::vector<Vec<2>> shift;             // [m], regularisation to be applied in the next move
   std::vector<Vec<2>> shift_velocity;    // [m/s], change of velocity along that shift
   std::vector<double> pressure;          // [Pa], mean over the last step
+  std::vector<Vec<2>> pressure_gradient; // [Pa/m], of the last step
   std::vector<std::int32_t> id;          // stays with the point for its life
   std::vector<SurfaceMemory> at_surface; // in the last step
 
@@ -34,6 +35,7 @@ template <class AnyPoints, class Body> void for_each_array(AnyPoints &points, Bo
   body("shift", points.shift);
   body("shift_velocity", points.shift_velocity);
   body("pressure", points.pressure);
+  body("pressure_gradient", points.pressure_gradient);
   body("id", points.id);
   body("at_surface", points.at_surface);
 }

@@ -39,14 +39,22 @@ void add_leg(Walls &walls, const WallParams &wall, int wall_index, const Vec<2> 
 void add_wall(Walls &walls, const WallParams &wall) {
   const int index = static_cast<int>(walls.names.size());
   walls.names.push_back(wall.name);
+  check(!wall.coupled || wall.velocity.isZero(),
+        "wall '{}': a coupled wall moves as its partner says, not with velocity_m_s", wall.name);
   const int first = static_cast<int>(walls.position.size());
   walls.position.push_back(wall.points.front());
   for (std::size_t k = 1; k < wall.points.size(); ++k) {
     check((wall.points[k] - wall.points[k - 1]).norm() > 1e-9,
           "wall '{}': points {} and {} coincide at ({}, {}) m", wall.name, k - 1, k,
           wall.points[k].x(), wall.points[k].y());
+    const Vec<2> leg = (wall.points[k] - wall.points[k - 1]).normalized();
+    check(std::abs(cross(leg, wall.velocity)) <= 1e-9 * wall.velocity.norm(),
+          "wall '{}': velocity_m_s = [{}, {}] points across the leg from point {} to {}; it may only "
+          "slide along itself",
+          wall.name, wall.velocity.x(), wall.velocity.y(), k - 1, k);
     add_leg(walls, wall, index, wall.points[k]);
   }
+  walls.velocity.resize(walls.position.size(), wall.velocity);
   if (wall.coupled)
     for (int v = first; v < static_cast<int>(walls.position.size()); ++v)
       walls.coupled_vertices.push_back(v);
@@ -71,7 +79,6 @@ Walls read_walls(const Config &config) {
   check_names(tables, "wall");
   for (const WallParams &wall : tables)
     add_wall(walls, wall);
-  walls.velocity.assign(walls.position.size(), Vec<2>::Zero());
   link_outlines(walls);
   return walls;
 }
@@ -178,11 +185,31 @@ void check_water(const FluidParams &params) {
           corner.y(), params.outlet_x);
 }
 
+// Rows along two edges, half a distance inside; a rhombus of 60 degrees gets a triangular lattice.
+std::vector<Vec<2>> lattice_along_edges(const std::vector<Vec<2>> &polygon, double spacing) {
+  check(polygon.size() == 4 &&
+            (polygon[0] + polygon[2] - polygon[1] - polygon[3]).norm() < 1e-6 * spacing,
+        "lattice = \"edges\" needs a parallelogram as water_m");
+  const Vec<2> a = polygon[1] - polygon[0], b = polygon[3] - polygon[0];
+  const double widening = std::sqrt(a.norm() * b.norm() / std::abs(cross(a, b)));
+  const auto count = [&](const Vec<2> &edge) {
+    return std::max(1, static_cast<int>(std::lround(edge.norm() / (widening * spacing))));
+  };
+  const int na = count(a), nb = count(b);
+  std::vector<Vec<2>> points;
+  for (int j = 0; j < nb; ++j)
+    for (int i = 0; i < na; ++i)
+      points.push_back(polygon[0] + (i + 0.5) / na * a + (j + 0.5) / nb * b);
+  return points;
+}
+
 Points fill(const FluidParams &params) {
   check_water(params);
   Points points;
-  points.position =
-      lattice_in(params.water, params.spacing, params.lattice_angle * std::numbers::pi / 180);
+  points.position = params.lattice == "edges"
+                        ? lattice_along_edges(params.water, params.spacing)
+                        : lattice_in(params.water, params.spacing,
+                                     params.lattice_angle * std::numbers::pi / 180);
   const std::size_t n = points.position.size();
   check(n >= 4, "water_m holds {} points at a spacing of {} m; use a smaller spacing_m", n,
         params.spacing);
@@ -190,6 +217,7 @@ Points fill(const FluidParams &params) {
   points.previous_velocity.assign(n, Vec<2>::Zero());
   points.shift.assign(n, Vec<2>::Zero());
   points.shift_velocity.assign(n, Vec<2>::Zero());
+  points.pressure_gradient.assign(n, params.density * params.gravity);
   points.pressure = hydrostatic_pressure(params, points.position);
   points.at_surface.assign(n, SurfaceMemory::enclosed);
   points.id.resize(n);
@@ -223,9 +251,13 @@ void check_clear_of_walls(const Scene &scene, double tolerance) {
 Scene read_scene(const Config &config) {
   Scene scene;
   scene.params = config.read<FluidParams>("fluid");
+  scene.params.rheology =
+      Rheology(config.read<RheologyParams>("fluid.rheology"), scene.params.viscosity);
   scene.walls = read_walls(config);
   scene.gauges = config.read_all<GaugeParams>("fluid.gauge");
   check_names(scene.gauges, "gauge");
+  scene.probes = config.read_all<ProbeParams>("fluid.probe");
+  check_names(scene.probes, "probe");
   check(!scene.walls.segments.empty(), "{}: the scene has no [[fluid.wall]]", config.file_name());
   scene.initial.points = fill(scene.params);
   check_clear_of_walls(scene, 0);

@@ -5,6 +5,7 @@
 #include "bridge/base/config.hpp"
 #include "fluid/motion.hpp"
 #include "fluid/points.hpp"
+#include "fluid/rheology.hpp"
 #include "fluid/walls.hpp"
 
 #include <string>
@@ -19,15 +20,18 @@ struct FluidParams {
   double viscosity = 1e-3;
   Vec<2> gravity{0, -9.81};
   std::vector<Vec<2>> water;
+  std::string lattice = "square";
   double lattice_angle = 0;
   double outlet_x = 1e300;
   bool open_sides = false;
   std::string coupled_walls = "move";
   std::string start_state;
+  int time_order = 1;
   double pressure_tolerance = 1e-7;
   double row_guard = 0.1;
   double noise_damping = 0.5;
   MotionParams motion;
+  Rheology rheology; // from table [fluid.rheology] and `viscosity`
 
   template <class Reader> void describe(Reader &read) {
     read.required("spacing_m", spacing, "distance between points").positive();
@@ -36,6 +40,9 @@ struct FluidParams {
     read("gravity_m_s2", gravity, "acceleration of gravity");
     read.required("water_m", water, "polygon that is filled with points at t = 0")
         .check(water.size() >= 3, "needs at least three corners");
+    read("lattice", lattice,
+         "of the first points: square, or along the edges of a parallelogram water_m")
+        .one_of({"square", "edges"});
     read("lattice_angle_deg", lattice_angle, "angle by which the first lattice is turned")
         .at_least(-45)
         .at_most(45);
@@ -45,18 +52,22 @@ struct FluidParams {
         .one_of({"move", "stay"});
     read("start_state", start_state,
          "file fluid_state.h5 of a run to go on from, instead of filling water_m");
+    read("time_order", time_order,
+         "1: each step by itself; 2: backward differences over two, viscosity with the last pressure")
+        .at_least(1)
+        .at_most(2);
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")
         .at_least(1e-12)
         .at_most(1e-2);
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
     read("noise_damping", noise_damping,
-         "decay of velocity modes at the scale of the points, in sqrt(g / spacing)")
+         "decay of velocity modes at the scale of the points, in units of the pace")
         .at_least(0);
     read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
         .at_least(0);
     read("agitation", motion.agitation, "disturbance of the points per unit of strain, in spacings")
         .at_least(0);
-    read("volume_rate", motion.volume_rate, "decay of volume errors, in sqrt(g / spacing)")
+    read("volume_rate", motion.volume_rate, "decay of volume errors, in units of the pace")
         .at_least(0);
     read("closest_pair", motion.closest_pair, "closest distance of two points, in spacings")
         .at_least(0)
@@ -73,6 +84,7 @@ struct WallParams {
   std::vector<Vec<2>> points;
   bool coupled = false;
   double segment_length = 0;
+  Vec<2> velocity{0, 0};
 
   template <class Reader> void describe(Reader &read) {
     read.required("name", name, "name of the wall");
@@ -81,6 +93,7 @@ struct WallParams {
     read("coupled", coupled, "moves with the partner of the bridge");
     read("segment_length_m", segment_length, "longest segment; 0 keeps the given ones")
         .at_least(0);
+    read("velocity_m_s", velocity, "of a wall that slides along itself, as a lid does");
   }
 };
 
@@ -95,10 +108,25 @@ struct GaugeParams {
   }
 };
 
+/// Table [[fluid.probe]]: places along a line.
+struct ProbeParams {
+  std::string name;
+  Vec<2> from{0, 0}, to{0, 0};
+  int samples = 1;
+
+  template <class Reader> void describe(Reader &read) {
+    read.required("name", name, "name of the probe: letters, digits, _ and -");
+    read.required("from_m", from, "first place");
+    read.required("to_m", to, "last place");
+    read("samples", samples, "number of places, ends included").at_least(1).at_most(1e6);
+  }
+};
+
 struct Scene {
   FluidParams params;
   Walls walls;
   std::vector<GaugeParams> gauges;
+  std::vector<ProbeParams> probes;
   FluidState initial;
 };
 

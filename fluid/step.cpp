@@ -20,6 +20,7 @@ FluidSolver::FluidSolver(const Scene &scene)
 void FluidSolver::begin_step(double dt) {
   dt_ = dt;
   report_ = {};
+  pace_ = pace_of(state.points, params_.gravity.norm(), params_.spacing);
   timer("move", [&] { move_points(state.points, dt, state.step_size); });
   freeze_cloud();
   timer("viscosity", [&] { predict_velocity(); });
@@ -28,7 +29,7 @@ void FluidSolver::begin_step(double dt) {
 
 void FluidSolver::iterate() {
   Points &points = state.points;
-  set_wall_velocity(walls, cloud_, pressure_params_, dt_, problem_);
+  set_wall_velocity(walls, cloud_, pressure_params_, projection_dt_, problem_);
   const SolveResult result = timer("pressure solve", [&] {
     SolveOptions options;
     options.relative_tolerance = params_.pressure_tolerance;
@@ -42,7 +43,7 @@ void FluidSolver::iterate() {
   report_.pressure_iterations += result.iterations;
   ++report_.pressure_solves;
   timer("loads", [&] {
-    evaluate_tractions(points, walls, cloud_, problem_, points.pressure, params_.viscosity,
+    evaluate_tractions(points, walls, cloud_, problem_, points.pressure, viscosity(),
                        quadrature_, tractions_);
     integrate_nodal_forces(walls, quadrature_, tractions_, nodal_forces_);
   });
@@ -51,16 +52,15 @@ void FluidSolver::iterate() {
 void FluidSolver::end_step() {
   Points &points = state.points;
   timer("project", [&] {
-    const double factor = dt_ / params_.density;
+    const double factor = projection_dt_ / params_.density;
     for_each_point(points.size(), [&](int i) {
+      points.pressure_gradient[i] =
+          pressure_gradient(i, points, cloud_, problem_, points.pressure);
       points.previous_velocity[i] = points.velocity[i];
-      points.velocity[i] = predicted_[i] - factor * pressure_gradient(i, points, cloud_, problem_,
-                                                                      points.pressure);
+      points.velocity[i] = predicted_[i] - factor * points.pressure_gradient[i];
     });
-    const double rate = params_.noise_damping *
-                        std::sqrt(params_.gravity.norm() / params_.spacing);
-    damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient, rate, dt_,
-                     points.velocity);
+    damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient,
+                     params_.noise_damping * pace_, dt_, points.velocity);
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
   });
   ++state.step;
@@ -137,29 +137,59 @@ void FluidSolver::freeze_cloud() {
   timer("cells", [&] { update_cells(points, cloud_); });
 }
 
+// The velocity from which the step's forces act over projection_dt_: that of the last step, or of
+// the last two by backward differences of second order (steps of unequal length: ratio r).
+void FluidSolver::extrapolate_velocity() {
+  const Points &points = state.points;
+  const bool is_second_order = params_.time_order == 2 && state.step > 0;
+  const double r = is_second_order ? dt_ / state.step_size : 0;
+  const double now = (1 + r) * (1 + r) / (1 + 2 * r), before = r * r / (1 + 2 * r);
+  projection_dt_ = dt_ * (1 + r) / (1 + 2 * r);
+  predicted_.resize(points.size());
+  for_each_point(points.size(), [&](int i) {
+    predicted_[i] = now * points.velocity[i] - before * points.previous_velocity[i];
+  });
+}
+
+// Viscosity acts on a velocity that knows the pressure: in the first-order scheme that of water at
+// rest, so that it stays at rest; in the second-order one that of the last step.
 void FluidSolver::predict_velocity() {
-  Points &points = state.points;
-  const double nu = params_.viscosity / params_.density;
-  predicted_.assign(points.velocity.begin(), points.velocity.end());
-  if (nu > 0)
-    report_.viscous_iterations = diffuse_velocity(points, walls, cloud_, nu, dt_, predicted_,
-                                                  viscous_, memory_);
-  for_each_point(points.size(), [&](int i) { predicted_[i] += dt_ * params_.gravity; });
+  const Points &points = state.points;
+  extrapolate_velocity();
+  const bool knows_pressure = params_.time_order == 2;
+  const auto unbalanced = [&](int i) -> Vec<2> {
+    return params_.gravity - points.pressure_gradient[i] / params_.density;
+  };
+  if (!params_.rheology.is_inviscid()) {
+    if (knows_pressure)
+      for_each_point(points.size(),
+                     [&](int i) { predicted_[i] += projection_dt_ * unbalanced(i); });
+    build_viscous_rows(points, cloud_, viscous_);
+    const ViscousResult result = diffuse_velocity(points, walls, cloud_, params_.rheology,
+                                                  params_.density, projection_dt_, predicted_,
+                                                  viscous_);
+    report_.viscous_iterations = result.iterations;
+    report_.viscous_passes = result.passes;
+    report_.viscous_rows = viscous_.rows;
+    if (knows_pressure)
+      for_each_point(points.size(),
+                     [&](int i) { predicted_[i] -= projection_dt_ * unbalanced(i); });
+  }
+  for_each_point(points.size(), [&](int i) { predicted_[i] += projection_dt_ * params_.gravity; });
 }
 
 void FluidSolver::assemble() {
   Points &points = state.points;
   timer("operators", [&] {
     target_divergence_.resize(points.size());
-    volume_restoring_divergence(points, cloud_, params_.motion, params_.gravity.norm(),
-                                target_divergence_);
-    assemble_pressure(points, cloud_, pressure_params_, predicted_, target_divergence_, dt_,
-                      problem_);
+    volume_restoring_divergence(points, cloud_, params_.motion, pace_, target_divergence_);
+    assemble_pressure(points, cloud_, pressure_params_, predicted_, target_divergence_,
+                      projection_dt_, problem_);
     report_.rows = problem_.rows;
     if (state.step > 0) // the first step has no pressure to judge by
       report_.released =
-        release_tension(points, walls, pressure_params_, predicted_, target_divergence_, dt_,
-                        cloud_, problem_);
+          release_tension(points, walls, pressure_params_, predicted_, target_divergence_,
+                          projection_dt_, cloud_, problem_);
   });
   timer("pressure set-up", [&] {
     std::vector<Cell> cells(points.size());

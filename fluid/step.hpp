@@ -22,6 +22,8 @@ struct StepReport {
   RowCounts rows;
   int pressure_iterations = 0;  // over all coupling iterations of the step
   int viscous_iterations = 0;
+  int viscous_passes = 0; // over the viscosity law; 0: explicit
+  ViscousRowCounts viscous_rows;
   int pressure_solves = 0;
   Vec<2> contact_impulse{0, 0}; // of walls on the points that touched them [N s/m]
   int released = 0;             // points that bear no tension next to air
@@ -46,6 +48,8 @@ public:
   const WallQuadrature &quadrature() const { return quadrature_; }
   const Cloud &cloud() const { return cloud_; }
   const PressureProblem &problem() const { return problem_; }
+  /// Dynamic viscosity per point [Pa s]; empty in an inviscid fluid.
+  std::span<const double> viscosity() const { return viscous_.viscosity; }
   const StepReport &report() const { return report_; }
   const FluidParams &params() const { return params_; }
   double dt() const { return dt_; }
@@ -57,12 +61,15 @@ private:
   void leave_through_outlet();
   double energy_of_point(const Vec<2> &u, const Vec<2> &x) const;
   void freeze_cloud();
+  void extrapolate_velocity();
   void predict_velocity();
   void assemble();
 
   FluidParams params_;
   PressureParams pressure_params_;
-  double dt_ = 0;
+  double dt_ = 0;            // [s], of the step
+  double projection_dt_ = 0; // [s], over which the forces of the step act on predicted_
+  double pace_ = 0;          // [1/s], of what happens at the scale of the points
   Cloud cloud_;
   PressureProblem problem_;
   ViscousProblem viscous_;

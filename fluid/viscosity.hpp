@@ -1,29 +1,79 @@
 // SPDX-License-Identifier: MIT
-// Implicit viscous diffusion of the velocity, no-slip at walls:
-//   (1 - dt nu L) u = u^n,  L the renormalised Laplacian with the wall projections as neighbours.
-// It acts before gravity is added, so that water at rest stays at rest. Open points (surface, thin)
-// keep their velocity: a one-sided Laplacian would be worse than none.
+// Viscous diffusion of the velocity, rho Du/Dt = div(2 mu E), on a frozen cloud.
+//
+//   interior  mean-viscosity Laplacian plus the transpose term,
+//             sum_j a_ij (mu_i + mu_j)/2 (u_j - u_i) + (grad u)^T grad mu,  walls as data (no-slip),
+//   surface   quadratic fit of both components together that holds the traction-free conditions
+//             t . 2E n = 0 and div u = 0 half a spacing outside the point,
+//   thin      pairs of points act along their line: momentum and angular momentum are kept, no
+//             traction on either side.
+//
+// The step is implicit unless viscosity reaches less than a seventh of a spacing in it; then the
+// same rows act once, explicitly.
 #pragma once
 
 #include "fluid/bicgstab.hpp"
 #include "fluid/cloud.hpp"
+#include "fluid/multigrid.hpp"
+#include "fluid/rheology.hpp"
 
+#include <array>
 #include <span>
 #include <vector>
 
 namespace sluice::fluid {
 
-/// Memory of the viscous solve, kept between steps.
-struct ViscousProblem {
-  SparseMatrix matrix; // rows scaled to 1 + ...: entries of order max(1, dt nu / spacing^2)
-  ScaledMatrix scaled;
-  std::vector<double> source_x, source_y, x, y; // [m/s]
+/// How the rows of the viscous operator were made, for the run report.
+struct ViscousRowCounts {
+  int quadratic = 0; // interior: quadratic fit
+  int linear = 0;    // interior, fallback: renormalised (LDD) Laplacian, positive weights
+  int surface = 0;   // surface: traction-free quadratic fit
+  int pairs = 0;     // thin, and fallback of the surface: central forces between pairs
 };
 
-/// Diffuses `velocity` [m/s] over `dt` [s] with kinematic viscosity `nu` [m^2/s]; returns the
-/// iterations needed, both components together. Throws UserError when the solver does not converge.
-int diffuse_velocity(const Points &points, const Walls &walls, const Cloud &cloud, double nu,
-                     double dt, std::span<Vec<2>> velocity, ViscousProblem &problem,
-                     KrylovMemory &memory);
+/// Weights of one wall projection in the rows of its point.
+struct ViscousWallWeight {
+  double laplacian = 0;   // [1/m^2]
+  Vec<2> gradient{0, 0};  // [1/m]
+  double viscosity = 0;   // mean of the point's and the wall's [Pa s]
+};
+
+/// Memory of the viscous solve, kept between steps.
+struct ViscousProblem {
+  std::vector<double> viscosity;         // [Pa s], per point
+  std::vector<Mat<2>> velocity_gradient; // [1/s], walls included; what the law has seen last
+
+  std::vector<int> start;                // of each point's neighbours in the three arrays below
+  std::vector<double> laplacian;         // [1/m^2], scalar rows
+  std::vector<Vec<2>> gradient;          // [1/m]
+  std::vector<Mat<2>> block;             // [1/m^2], open rows: of the components together
+  std::vector<std::array<ViscousWallWeight, 3>> wall_weights; // per wall slot
+  ViscousRowCounts rows;
+
+  SparseMatrix matrix, scalar_matrix; // of both components, interleaved; of one, for multigrid
+  ScaledMatrix scaled, scalar_scaled;
+  Multigrid multigrid;
+  KrylovMemory memory;
+  double relative_tolerance = 1e-8; // of the linear solves
+  std::vector<double> source, solution, previous; // [m/s], interleaved
+};
+
+/// Stencils of a frozen cloud; once per step.
+void build_viscous_rows(const Points &points, const Cloud &cloud, ViscousProblem &problem);
+
+struct ViscousResult {
+  int iterations = 0; // of the linear solver
+  int passes = 0;     // over the viscosity law; 0: explicit
+};
+
+/// Diffuses `velocity` [m/s] over `dt` [s] in a fluid of the given density [kg/m^3]; walls move with
+/// their velocity. The law is evaluated anew until the velocity changes by less than its
+/// tolerance. Throws UserError when a solve does not converge.
+ViscousResult diffuse_velocity(const Points &points, const Walls &walls, const Cloud &cloud,
+                               const Rheology &rheology, double density, double dt,
+                               std::span<Vec<2>> velocity, ViscousProblem &problem);
+
+/// Shear rate sqrt(2 E : E) [1/s] of a velocity gradient.
+double shear_rate(const Mat<2> &gradient);
 
 } // namespace sluice::fluid

@@ -145,7 +145,7 @@ void build_wall_quadrature(const Points &points, const Walls &walls, const Cloud
 
 void evaluate_tractions(const Points &points, const Walls &walls, const Cloud &cloud,
                         const PressureProblem &problem, std::span<const double> pressure,
-                        double viscosity, const WallQuadrature &quadrature,
+                        std::span<const double> viscosity, const WallQuadrature &quadrature,
                         std::vector<Vec<2>> &traction) {
   std::vector<Vec<2>> gradient(quadrature.feeders.size());
   for_each_index(static_cast<int>(gradient.size()), [&](int f) {
@@ -164,9 +164,11 @@ void evaluate_tractions(const Points &points, const Walls &walls, const Cloud &c
       const int i = quadrature.feeders[feeder];
       const Vec<2> r = s.position - points.position[i];
       p += w * (pressure[i] + gradient[feeder].dot(r));
+      if (viscosity.empty())
+        continue;
       const Vec<2> slip = points.velocity[i] - wall_velocity;
       const double distance = std::max(r.dot(s.normal), 0.25 * cloud.spacing);
-      shear += w * viscosity / distance * (slip - slip.dot(s.normal) * s.normal);
+      shear += w * viscosity[i] / distance * (slip - slip.dot(s.normal) * s.normal);
     }
     traction[k] = p * s.normal + shear;
   });

@@ -45,10 +45,10 @@ void build_wall_quadrature(const Points &points, const Walls &walls, const Cloud
                            WallPart part, WallQuadrature &quadrature);
 
 /// Tractions at the samples [Pa]: pressure times the normal, and viscous shear with the tangential
-/// velocity difference to the wall over the distance.
+/// velocity difference to the wall over the distance. `viscosity` [Pa s] per point; none without.
 void evaluate_tractions(const Points &points, const Walls &walls, const Cloud &cloud,
                         const PressureProblem &problem, std::span<const double> pressure,
-                        double viscosity, const WallQuadrature &quadrature,
+                        std::span<const double> viscosity, const WallQuadrature &quadrature,
                         std::vector<Vec<2>> &traction);
 
 /// Consistent nodal forces [N/m] on all wall vertices: sum of traction times linear shape function.

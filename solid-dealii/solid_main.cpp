@@ -25,7 +25,8 @@ template <int dim> void print_check(const sluice::solid::SolidParams &params) {
 void run(const Options &options) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
-  config.allow_tables({"case", "bridge", "fluid", "fluid.wall", "fluid.gauge", "solid"});
+  config.allow_tables({"case", "parameters", "bridge", "fluid", "fluid.rheology", "fluid.wall", "fluid.gauge",
+                       "fluid.probe", "solid"});
   if (options.check_only) {
     const auto params = config.read<solid::SolidParams>("solid");
     return params.dimension == 2 ? print_check<2>(params) : print_check<3>(params);

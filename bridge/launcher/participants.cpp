@@ -78,7 +78,7 @@ fs::path find_program(const Kind &kind, const fs::path &given) {
 
 Case read_case(const Config &config) {
   // Each participant knows its own sub-tables.
-  config.allow_tables({"case", "bridge", "fluid", "fluid.*", "solid", "solid.*"});
+  config.allow_tables({"case", "parameters", "bridge", "fluid", "fluid.*", "solid", "solid.*"});
   const std::string name = config.read<bridge::CaseSettings>("case").name;
   check(!name.empty() && name.find('/') == std::string::npos,
         "{}: [case] needs a name without a slash, for the run folder and the ParaView file",

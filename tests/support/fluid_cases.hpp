@@ -24,7 +24,8 @@ inline Points points_at(const std::vector<Vec<2>> &position) {
   const std::size_t n = position.size();
   points.position = position;
   for (auto *v :
-       {&points.velocity, &points.previous_velocity, &points.shift, &points.shift_velocity})
+       {&points.velocity, &points.previous_velocity, &points.shift, &points.shift_velocity,
+        &points.pressure_gradient})
     v->assign(n, Vec<2>::Zero());
   points.pressure.assign(n, 0);
   points.at_surface.assign(n, SurfaceMemory::enclosed);

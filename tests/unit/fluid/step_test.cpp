@@ -121,7 +121,7 @@ TEST(Step, ChangeOfMomentumIsWeightPlusWallImpulses) {
     const Points &points = solver.state.points;
     build_wall_quadrature(points, solver.walls, solver.cloud(), WallPart::all, walls);
     evaluate_tractions(points, solver.walls, solver.cloud(), solver.problem(), points.pressure,
-                       params.viscosity, walls, traction);
+                       solver.viscosity(), walls, traction);
     const Vec<2> on_walls = integrate_resultant(walls, traction).force;
     impulse += dt * (Vec<2>(0, -weight) - on_walls);
     solver.end_step();
