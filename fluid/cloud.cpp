@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 namespace sluice::fluid {
@@ -97,7 +98,8 @@ double enveloped_area(VoronoiCell cell, const Vec<2> &normal, PointKind kind, do
 void update_cell(int i, Points &points, Cloud &cloud) {
   const VoronoiCell cell = cell_of(i, points, cloud);
   const bool was_open = points.at_surface[i] == SurfaceMemory::open;
-  const double limit = (was_open ? close_ratio : open_ratio) * cloud.spacing;
+  const double limit = cloud.has_air ? (was_open ? close_ratio : open_ratio) * cloud.spacing
+                                     : std::numeric_limits<double>::infinity();
   cloud.surface_normal[i] = Vec<2>::Zero();
   cloud.kind[i] = PointKind::interior;
   const bool is_open = cell.reach() > limit;

@@ -22,6 +22,7 @@ enum class PointKind : std::uint8_t {
 struct Cloud {
   double spacing = 0; // nominal distance between points [m]
   double radius = 0;  // of the kernel [m]
+  bool has_air = true; // false: the fluid fills its container, holes are no surface
   Grid grid;
   CellRanges ranges;
   NeighbourLists neighbours; // those in sight

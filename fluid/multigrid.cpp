@@ -2,6 +2,7 @@
 #include "fluid/multigrid.hpp"
 
 #include <cmath>
+#include <numeric>
 
 namespace sluice::fluid {
 namespace {
@@ -10,6 +11,8 @@ constexpr int most_levels = 32; // 32-bit cell coordinates have come down to one
 
 // Rows have a unit diagonal; a smaller pivot is that of a piece that is enclosed by walls.
 constexpr double vanishing_pivot = 1e-5;
+// Row sums, in units of the diagonal, that are zero but for the rounding of single precision.
+constexpr double vanishing_row_sum = 1e-4;
 
 int floor_divided(int a, int b) { return a >= 0 ? a / b : -((-a + b - 1) / b); }
 
@@ -99,9 +102,22 @@ void Multigrid::invert_coarsest() {
     work_[i * n + i] = 1;
     matrix.for_each_entry(i, [&](int j, float value) { work_[i * n + j] += value; });
   }
+  shift_constants(n);
   for (int pivot = 0; pivot < n; ++pivot)
     eliminate(pivot, n);
   inverse_.assign(work_.begin(), work_.end());
+}
+
+// Where all rows sum to zero a constant has no residual: A + 1 1^T / n is regular, has the same
+// inverse for everything else, and its answer to a constant is small.
+void Multigrid::shift_constants(int n) {
+  for (int i = 0; i < n; ++i) {
+    const auto row = work_.begin() + static_cast<std::ptrdiff_t>(i) * n;
+    if (std::abs(std::accumulate(row, row + n, 0.0)) > vanishing_row_sum)
+      return;
+  }
+  for (double &value : work_)
+    value += 1.0 / n;
 }
 
 // An unknown whose pivot vanishes, the constant of an enclosed piece, is held at zero.

@@ -64,6 +64,7 @@ private:
   void start_level(int level);
   void coarsen(int level);
   void invert_coarsest();
+  void shift_constants(int n);
   void eliminate(int pivot, int n);
   void cycle(int level, std::span<float> x);
   void solve_coarsest(std::span<float> x) const;

@@ -54,12 +54,25 @@ template <class Visit> void for_each_point_near(const Cloud &cloud, const Vec<2>
         visit(i);
 }
 
+// A place on a wall is moved into the fluid by a millionth of a spacing: from the wall itself nothing
+// is in sight.
+Vec<2> off_the_wall(const Walls &walls, std::span<const int> near_walls, const Vec<2> &place,
+                    const Cloud &cloud) {
+  const double least = 1e-6 * cloud.spacing;
+  Vec<2> moved = place;
+  for (const Projection &p : project_on_walls(walls, near_walls, place, cloud.radius))
+    if (std::abs(p.distance) < least)
+      moved -= least * p.normal;
+  return moved;
+}
+
 } // namespace
 
-Reading read_at(const FluidSolver &solver, const Vec<2> &place) {
+Reading read_at(const FluidSolver &solver, const Vec<2> &wanted) {
   const Cloud &cloud = solver.cloud();
   const Points &points = solver.state.points;
-  const auto near_walls = cloud.near_segments.near(cloud.grid.cell(place));
+  const auto near_walls = cloud.near_segments.near(cloud.grid.cell(wanted));
+  const Vec<2> place = off_the_wall(solver.walls, near_walls, wanted, cloud);
   ValueFit<2> velocity;
   ValueFit<1> pressure;
   for_each_point_near(cloud, place, [&](int i) {

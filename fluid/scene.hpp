@@ -24,6 +24,7 @@ struct FluidParams {
   double lattice_angle = 0;
   double outlet_x = 1e300;
   bool open_sides = false;
+  bool free_surface = true;
   std::string coupled_walls = "move";
   std::string start_state;
   int time_order = 1;
@@ -48,6 +49,8 @@ struct FluidParams {
         .at_most(45);
     read("outlet_x_m", outlet_x, "points beyond leave the scene and count as outflow");
     read("open_sides", open_sides, "water may touch air at its sides and below at t = 0");
+    read("free_surface", free_surface, "false: the fluid fills a closed container and has no air")
+        .check(free_surface || outlet_x > 1e299, "has no outlet: outlet_x_m is for water next to air");
     read("coupled_walls", coupled_walls, "what coupled walls do")
         .one_of({"move", "stay"});
     read("start_state", start_state,
