@@ -191,8 +191,6 @@ Vec<2> renormalising_skew(const Stencil &s, const Points &points, const Cloud &c
   return fit.inverse() * offset;
 }
 
-enum class RowKind { quadratic, linear, plain };
-
 /// The fallback ladder: the first row whose signs keep the matrix definite.
 RowKind laplacian_row(const Stencil &s, const Points &points, const Cloud &cloud,
                       const QuadraticFit *fit, double guard, Row &row) {
@@ -237,26 +235,24 @@ void lay_out(const Cloud &cloud, PressureProblem &problem) {
   problem.fluid_source.resize(n);
   problem.source.resize(n);
   problem.gradient.resize(n);
+  problem.row_kind.resize(n);
   problem.velocity_gradient.resize(n);
   problem.wall_rows.assign(cloud.point_walls.size(), {});
 }
 
-class Assembler {
+/// What the cloud alone decides: matrix, gradient functionals, weights of the wall data.
+class OperatorAssembler {
 public:
-  Assembler(const Points &points, const Cloud &cloud, const PressureParams &params,
-            std::span<const Vec<2>> velocity, std::span<const double> target, double dt,
-            PressureProblem &problem)
-      : points_(points), cloud_(cloud), params_(params), velocity_(velocity), target_(target),
-        dt_(dt), problem_(problem) {}
+  OperatorAssembler(const Points &points, const Cloud &cloud, const PressureParams &params,
+                    PressureProblem &problem)
+      : points_(points), cloud_(cloud), params_(params), problem_(problem) {}
 
   RowKind row(int i) const {
     Stencil s;
     gather(i, points_, cloud_, s);
-    if (cloud_.kind[i] != PointKind::interior) {
-      open_row(s);
-      return RowKind::quadratic;
-    }
-    return poisson_row(s);
+    const RowKind kind = cloud_.kind[i] != PointKind::interior ? open_row(s) : poisson_row(s);
+    problem_.row_kind[i] = kind;
+    return kind;
   }
 
 private:
@@ -265,14 +261,13 @@ private:
             static_cast<std::size_t>(s.count)};
   }
 
-  void open_row(const Stencil &s) const {
+  RowKind open_row(const Stencil &s) const {
     problem_.matrix.value[problem_.matrix.row_start[s.i]] = 1;
-    problem_.fluid_source[s.i] = 0;
     surface_row(s, cloud_, off_diagonal(s));
     problem_.gradient[s.i] = linear_gradient(s, cloud_);
-    update_velocity_gradient(s, linear_functional(s));
     if (s.walls)
       problem_.wall_rows[cloud_.wall_slot[s.i]] = {};
+    return RowKind::open;
   }
 
   RowKind poisson_row(const Stencil &s) const {
@@ -283,11 +278,7 @@ private:
         laplacian_row(s, points_, cloud_, regular ? &fit : nullptr, params_.row_guard, row);
     if (kind != RowKind::quadratic)
       problem_.gradient[s.i] = linear_gradient(s, cloud_);
-    bool near_wall = false;
-    for_each_wall_row(s, cloud_, [&](int, const Projection &) { near_wall = true; });
-    const bool symmetric = kind == RowKind::quadratic && !near_wall;
-    update_velocity_gradient(s, symmetric ? problem_.gradient[s.i] : linear_functional(s));
-    update_wall_rows(s, row.wall);
+    set_wall_rows(s, row.wall);
     finish_poisson_row(s, row);
     return kind;
   }
@@ -302,27 +293,14 @@ private:
     return gradient.norm() * s.h < largest_norm;
   }
 
-  Eigen::Matrix<double, 5, 2> linear_functional(const Stencil &s) const {
-    Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
-    functional.topRows<2>() = fluid_gradient(s);
-    return functional;
-  }
-
-  void update_velocity_gradient(const Stencil &s,
-                                const Eigen::Matrix<double, 5, 2> &functional) const {
-    problem_.velocity_gradient[s.i] = velocity_gradient(s, velocity_, functional);
-  }
-
-  void update_wall_rows(const Stencil &s, const std::array<double, 3> &laplacian) const {
+  void set_wall_rows(const Stencil &s, const std::array<double, 3> &laplacian) const {
     const double scale = cloud_.spacing * cloud_.spacing;
     for_each_wall_row(s, cloud_, [&](int m, const Projection &p) {
-      const Vec<2> r = p.point - points_.position[s.i];
-      const Vec<2> u = velocity_[s.i] + problem_.velocity_gradient[s.i] * r;
+      const Vec<2> q = (p.point - points_.position[s.i]) / s.h;
       WallRow &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
-      wall.approach = p.normal.dot(u);
       wall.laplacian = scale * laplacian[m];
       wall.gradient = wall_weight * s.h *
-                      (problem_.gradient[s.i].transpose() * normal_derivative(r / s.h, p.normal));
+                      (problem_.gradient[s.i].transpose() * normal_derivative(q, p.normal));
     });
   }
 
@@ -334,21 +312,61 @@ private:
       sum -= a;
     }
     problem_.matrix.value[problem_.matrix.row_start[s.i]] = sum > 0 ? sum : 1.0;
-    double source = params_.density / dt_ *
-                    (problem_.velocity_gradient[s.i].trace() - target_[s.i]) * scale;
-    for_each_wall_row(s, cloud_, [&](int m, const Projection &) {
-      const WallRow &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
-      source -= wall.laplacian * params_.density / dt_ * wall.approach;
-    });
-    problem_.fluid_source[s.i] = -source;
   }
 
   const Points &points_;
   const Cloud &cloud_;
   const PressureParams &params_;
+  PressureProblem &problem_;
+};
+
+/// What the predicted velocity adds: its gradient, its approach to the walls, the source.
+class SourceAssembler {
+public:
+  SourceAssembler(const Points &points, const Cloud &cloud, const PressureParams &params,
+                  std::span<const Vec<2>> velocity, std::span<const double> target, double dt,
+                  PressureProblem &problem)
+      : points_(points), cloud_(cloud), velocity_(velocity), target_(target),
+        factor_(params.density / dt), problem_(problem) {}
+
+  void row(int i) const {
+    Stencil s;
+    gather(i, points_, cloud_, s);
+    problem_.velocity_gradient[i] = velocity_gradient(s, velocity_, functional_of(s));
+    problem_.fluid_source[i] = s.open ? 0.0 : -source_of(s);
+  }
+
+private:
+  // Far from walls the pressure's gradient, which is quadratic; next to one its rows do not hold for
+  // a velocity.
+  Eigen::Matrix<double, 5, 2> functional_of(const Stencil &s) const {
+    bool near_wall = false;
+    for_each_wall_row(s, cloud_, [&](int, const Projection &) { near_wall = true; });
+    if (problem_.row_kind[s.i] == RowKind::quadratic && !near_wall)
+      return problem_.gradient[s.i];
+    Eigen::Matrix<double, 5, 2> functional = Eigen::Matrix<double, 5, 2>::Zero();
+    functional.topRows<2>() = fluid_gradient(s);
+    return functional;
+  }
+
+  double source_of(const Stencil &s) const {
+    const double scale = cloud_.spacing * cloud_.spacing;
+    const Mat<2> &gradient = problem_.velocity_gradient[s.i];
+    double source = factor_ * (gradient.trace() - target_[s.i]) * scale;
+    for_each_wall_row(s, cloud_, [&](int m, const Projection &p) {
+      const Vec<2> at_wall = velocity_[s.i] + gradient * (p.point - points_.position[s.i]);
+      WallRow &wall = problem_.wall_rows[cloud_.wall_slot[s.i]][m];
+      wall.approach = p.normal.dot(at_wall);
+      source -= wall.laplacian * factor_ * wall.approach;
+    });
+    return source;
+  }
+
+  const Points &points_;
+  const Cloud &cloud_;
   std::span<const Vec<2>> velocity_;
   std::span<const double> target_;
-  double dt_;
+  double factor_;
   PressureProblem &problem_;
 };
 
@@ -396,34 +414,45 @@ int release_tension(Points &points, const Walls &walls, const PressureParams &pa
       changed.push_back(i);
     }
   }
-  const Assembler assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
-                           problem);
+  const OperatorAssembler operators(points, cloud, params, problem);
+  const SourceAssembler sources(points, cloud, params, predicted_velocity, target_divergence, dt,
+                                problem);
+  const auto assemble = [&](int i) {
+    operators.row(i);
+    sources.row(i);
+  };
   for (const int i : changed) {
-    assemble.row(i);
+    assemble(i);
     for (const int j : cloud.neighbours.of(i))
       if (cloud.kind[j] == PointKind::surface)
-        assemble.row(j);
+        assemble(j);
   }
   return static_cast<int>(changed.size());
 }
 
-void assemble_pressure(const Points &points, const Cloud &cloud, const PressureParams &params,
-                       std::span<const Vec<2>> predicted_velocity,
-                       std::span<const double> target_divergence, double dt,
-                       PressureProblem &problem) {
+void assemble_pressure_operators(const Points &points, const Cloud &cloud,
+                                 const PressureParams &params, PressureProblem &problem) {
   lay_out(cloud, problem);
-  const Assembler assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
-                           problem);
-  const auto counts = block_sums<3>(points.size(), [&](IndexRange range) {
-    std::array<double, 3> count{};
+  const OperatorAssembler assemble(points, cloud, params, problem);
+  const auto counts = block_sums<4>(points.size(), [&](IndexRange range) {
+    std::array<double, 4> count{};
     for (int i = range.begin; i < range.end; ++i)
       count[static_cast<std::size_t>(assemble.row(i))] += 1;
     return count;
   }, Work::heavy);
   problem.rows = {static_cast<int>(counts[0]), static_cast<int>(counts[1]),
-                  static_cast<int>(counts[2])};
-  problem.has_open_point = std::any_of(cloud.kind.begin(), cloud.kind.end(),
-                                       [](PointKind kind) { return kind != PointKind::interior; });
+                  static_cast<int>(counts[2]), static_cast<int>(counts[3])};
+  problem.has_open_point = problem.rows.open > 0;
+}
+
+void assemble_pressure_source(const Points &points, const Cloud &cloud,
+                              const PressureParams &params,
+                              std::span<const Vec<2>> predicted_velocity,
+                              std::span<const double> target_divergence, double dt,
+                              PressureProblem &problem) {
+  const SourceAssembler assemble(points, cloud, params, predicted_velocity, target_divergence, dt,
+                                 problem);
+  for_each_point(points.size(), [&](int i) { assemble.row(i); });
 }
 
 void set_wall_velocity(const Walls &walls, const Cloud &cloud, const PressureParams &params,

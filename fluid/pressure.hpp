@@ -25,11 +25,17 @@ struct WallRow {
   double datum = 0;         // g = n . grad p [Pa/m], with the latest wall velocity
 };
 
-/// How the rows were made, for the run report.
+/// How a row of the Laplacian was made.
+enum class RowKind : std::uint8_t {
+  quadratic, // the quadratic fit
+  linear,    // sign guard: renormalised (LDD) Laplacian instead
+  plain,     // sign guard: positive weights without correction
+  open,      // of an open point: no Laplacian
+};
+
+/// Rows of each kind, for the run report.
 struct RowCounts {
-  int quadratic = 0; // the quadratic fit, or the surface row of an open point
-  int linear = 0;    // sign guard: renormalised (LDD) Laplacian instead
-  int plain = 0;     // sign guard: positive weights without correction
+  int quadratic = 0, linear = 0, plain = 0, open = 0;
 };
 
 /// The discrete pressure problem of one step.
@@ -38,6 +44,7 @@ struct PressureProblem {
   std::vector<double> fluid_source; // right-hand side without the wall velocity
   std::vector<double> source;       // right-hand side with it
   std::vector<Eigen::Matrix<double, 5, 2>> gradient; // functionals of d/dx and d/dy per point
+  std::vector<RowKind> row_kind;
   std::vector<std::array<WallRow, 3>> wall_rows;     // per wall slot
   std::vector<Mat<2>> velocity_gradient;             // of u* [1/s], row: component
   RowCounts rows;
@@ -49,12 +56,17 @@ struct PressureParams {
   double row_guard = 0.1;      // largest ratio of negative to positive weights in a row
 };
 
-/// Assembles matrix, fluid source and gradient functionals. `target_divergence` [1/s] per point is
-/// the rate at which a cell shall grow (volume control); `dt` [s].
-void assemble_pressure(const Points &points, const Cloud &cloud, const PressureParams &params,
-                       std::span<const Vec<2>> predicted_velocity,
-                       std::span<const double> target_divergence, double dt,
-                       PressureProblem &problem);
+/// Assembles matrix and gradient functionals, which the cloud alone decides.
+void assemble_pressure_operators(const Points &points, const Cloud &cloud,
+                                 const PressureParams &params, PressureProblem &problem);
+
+/// Assembles the fluid source of these operators. `target_divergence` [1/s] per point is the rate at
+/// which a cell shall grow (volume control); `dt` [s].
+void assemble_pressure_source(const Points &points, const Cloud &cloud,
+                              const PressureParams &params,
+                              std::span<const Vec<2>> predicted_velocity,
+                              std::span<const double> target_divergence, double dt,
+                              PressureProblem &problem);
 
 /// Water next to air bears no tension: an interior point that touches an open one, or one that was
 /// released in the last step, and whose row would pull its pressure below zero becomes open itself,

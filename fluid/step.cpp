@@ -24,6 +24,10 @@ void FluidSolver::begin_step(double dt) {
   pace_ = pace_of(state.points, params_.gravity.norm(), params_.spacing);
   timer("move", [&] { move_points(state.points, dt, state.step_size); });
   freeze_cloud();
+  timer("operators", [&] {
+    assemble_pressure_operators(state.points, cloud_, pressure_params_, problem_);
+    report_.rows = problem_.rows;
+  });
   timer("viscosity", [&] { predict_velocity(); });
   assemble();
 }
@@ -165,7 +169,7 @@ void FluidSolver::predict_velocity() {
     if (knows_pressure)
       for_each_point(points.size(),
                      [&](int i) { predicted_[i] += projection_dt_ * unbalanced(i); });
-    build_viscous_rows(points, cloud_, viscous_);
+    build_viscous_rows(points, cloud_, problem_, viscous_);
     const ViscousResult result = diffuse_velocity(points, walls, cloud_, params_.rheology,
                                                   params_.density, projection_dt_, predicted_,
                                                   viscous_);
@@ -184,9 +188,8 @@ void FluidSolver::assemble() {
   timer("operators", [&] {
     target_divergence_.resize(points.size());
     volume_restoring_divergence(points, cloud_, params_.motion, pace_, target_divergence_);
-    assemble_pressure(points, cloud_, pressure_params_, predicted_, target_divergence_,
-                      projection_dt_, problem_);
-    report_.rows = problem_.rows;
+    assemble_pressure_source(points, cloud_, pressure_params_, predicted_, target_divergence_,
+                             projection_dt_, problem_);
     if (state.step > 0) // the first step has no pressure to judge by
       report_.released =
           release_tension(points, walls, pressure_params_, predicted_, target_divergence_,

@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sluice::fluid {
 
@@ -56,8 +57,9 @@ class StencilBuilder {
 public:
   enum class Kind { quadratic, linear, surface, pairs };
 
-  StencilBuilder(const Points &points, const Cloud &cloud, ViscousProblem &problem)
-      : points_(points), cloud_(cloud), problem_(problem) {}
+  StencilBuilder(const Points &points, const Cloud &cloud, const PressureProblem &pressure,
+                 ViscousProblem &problem)
+      : points_(points), cloud_(cloud), pressure_(pressure), problem_(problem) {}
 
   Kind build(int i) const {
     const Row row = gather(i);
@@ -66,6 +68,10 @@ public:
     if (cloud_.kind[i] != PointKind::interior) {
       pair_row(row);
       return Kind::pairs;
+    }
+    if (!row.walls && pressure_.row_kind[i] == RowKind::quadratic) {
+      pressures_row(row);
+      return Kind::quadratic;
     }
     if (quadratic_row(row))
       return Kind::quadratic;
@@ -109,6 +115,17 @@ private:
         const Vec<2> q = scaled(row.i, row.walls->projection[m].point);
         wall_visit(m, q, wall_weight * weight_at(q));
       }
+  }
+
+  void pressures_row(const Row &row) const {
+    const double *weights = &pressure_.matrix.value[pressure_.matrix.row_start[row.i] + 1];
+    const double scale = -1 / (cloud_.spacing * cloud_.spacing);
+    const auto &functional = pressure_.gradient[row.i];
+    for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
+      const Vec<2> q = scaled(row.i, points_.position[row.neighbours[k]]);
+      row.laplacian[k] = scale * weights[k];
+      row.gradient[k] = weight_at(q) * (functional.transpose() * quadratic_basis(q));
+    }
   }
 
   bool quadratic_row(const Row &row) const {
@@ -277,6 +294,7 @@ private:
 
   const Points &points_;
   const Cloud &cloud_;
+  const PressureProblem &pressure_;
   ViscousProblem &problem_;
 };
 
@@ -326,15 +344,21 @@ void update_velocity_gradient(const Flow &flow, ViscousProblem &problem) {
   });
 }
 
-// Weight of the new viscosity, on a logarithmic scale: 1 / n damps the overshoot of thickening
-// fluids. Source: fixed point of mu(gamma(mu)) with d ln mu / d ln gamma = n - 1 at given stress,
-// derived here.
+// Weight of the new viscosity, on a logarithmic scale, where passes do not settle by themselves: 1 / n
+// damps the overshoot of thickening fluids. Source: fixed point of mu(gamma(mu)) with
+// d ln mu / d ln gamma = n - 1 at given stress, derived here.
 double relaxation_of(const Rheology &rheology) { return std::min(1.0, 1 / rheology.exponent()); }
 
-void set_viscosity(const Rheology &rheology, bool is_first, ViscousProblem &problem) {
+void set_uniform_viscosity(const Rheology &rheology, int n, ViscousProblem &problem) {
+  rheology.with_law([&](const auto &law) { problem.viscosity.assign(n, law(0)); });
+  for (auto &walls : problem.wall_weights)
+    for (ViscousWallWeight &wall : walls)
+      wall.viscosity = problem.viscosity.front();
+}
+
+void set_viscosity(const Rheology &rheology, double relaxation, ViscousProblem &problem) {
   const int n = static_cast<int>(problem.velocity_gradient.size());
   problem.viscosity.resize(n);
-  const double relaxation = is_first ? 1 : relaxation_of(rheology);
   rheology.with_law([&](const auto &law) {
     for_each_point(n, [&](int i) {
       const double now = law(shear_rate(problem.velocity_gradient[i]));
@@ -593,7 +617,8 @@ double shear_rate(const Mat<2> &gradient) {
   return (gradient + gradient.transpose()).norm() / std::sqrt(2.0);
 }
 
-void build_viscous_rows(const Points &points, const Cloud &cloud, ViscousProblem &problem) {
+void build_viscous_rows(const Points &points, const Cloud &cloud, const PressureProblem &pressure,
+                        ViscousProblem &problem) {
   const int n = points.size();
   problem.start.resize(n + 1);
   problem.start[0] = 0;
@@ -603,7 +628,7 @@ void build_viscous_rows(const Points &points, const Cloud &cloud, ViscousProblem
   problem.gradient.resize(problem.start[n]);
   problem.block.resize(problem.start[n]);
   problem.wall_weights.assign(cloud.point_walls.size(), {});
-  const StencilBuilder builder(points, cloud, problem);
+  const StencilBuilder builder(points, cloud, pressure, problem);
   const auto counts = block_sums<4>(
       n,
       [&](IndexRange range) {
@@ -623,14 +648,17 @@ ViscousResult diffuse_velocity(const Points &points, const Walls &walls, const C
   const int n = points.size();
   const double factor = dt / density, spacing2 = cloud.spacing * cloud.spacing;
   const ViscousForce force(walls, cloud, problem, rheology.is_newtonian());
-  const auto update_viscosity = [&](std::span<const Vec<2>> u, bool is_first) {
-    if (!rheology.is_newtonian() || is_first)
+  const auto update_viscosity = [&](std::span<const Vec<2>> u, double relaxation) {
+    if (rheology.is_newtonian()) {
+      set_uniform_viscosity(rheology, n, problem);
+    } else {
       update_velocity_gradient({walls, cloud, u}, problem);
-    set_viscosity(rheology, is_first, problem);
-    set_wall_viscosity(points, cloud, problem);
+      set_viscosity(rheology, relaxation, problem);
+      set_wall_viscosity(points, cloud, problem);
+    }
+    return factor * largest(problem.viscosity) / spacing2;
   };
-  update_viscosity(velocity, true);
-  double stiffness = factor * largest(problem.viscosity) / spacing2;
+  double stiffness = update_viscosity(velocity, 1);
   ViscousResult result;
   if (stiffness < explicit_limit) {
     apply_explicitly(force, factor, velocity, problem.source);
@@ -643,6 +671,8 @@ ViscousResult diffuse_velocity(const Points &points, const Walls &walls, const C
     for (int a = 0; a < 2; ++a)
       problem.solution[2 * i + a] = velocity[i][a];
   std::vector<Vec<2>> latest(velocity.begin(), velocity.end());
+  const RheologyParams &law = rheology.params();
+  double relaxation = 1, last_change = std::numeric_limits<double>::infinity();
   for (;;) {
     problem.previous = problem.solution;
     fill(force, cloud, factor, velocity, problem);
@@ -651,13 +681,17 @@ ViscousResult diffuse_velocity(const Points &points, const Walls &walls, const C
     for_each_point(n, [&](int i) {
       latest[i] = {problem.solution[2 * i], problem.solution[2 * i + 1]};
     });
-    const RheologyParams &law = rheology.params();
-    if (rheology.is_newtonian() || result.passes == law.picard_passes ||
-        (result.passes > 1 &&
-         relative_change(problem.solution, problem.previous) < law.picard_tolerance))
+    if (rheology.is_newtonian() || result.passes == law.picard_passes)
       break;
-    update_viscosity(latest, false);
-    stiffness = factor * largest(problem.viscosity) / spacing2;
+    const double change = relative_change(problem.solution, problem.previous);
+    if (result.passes > 1) {
+      if (change < law.picard_tolerance)
+        break;
+      if (change > 0.5 * last_change)
+        relaxation = relaxation_of(rheology);
+      last_change = change;
+    }
+    stiffness = update_viscosity(latest, relaxation);
   }
   std::copy(latest.begin(), latest.end(), velocity.begin());
   return result;

@@ -15,6 +15,7 @@
 #include "fluid/bicgstab.hpp"
 #include "fluid/cloud.hpp"
 #include "fluid/multigrid.hpp"
+#include "fluid/pressure.hpp"
 #include "fluid/rheology.hpp"
 
 #include <array>
@@ -58,8 +59,10 @@ struct ViscousProblem {
   std::vector<double> source, solution, previous; // [m/s], interleaved
 };
 
-/// Stencils of a frozen cloud; once per step.
-void build_viscous_rows(const Points &points, const Cloud &cloud, ViscousProblem &problem);
+/// Stencils of a frozen cloud; once per step. Away from walls and surfaces they are those of the
+/// pressure, whose operators must be assembled.
+void build_viscous_rows(const Points &points, const Cloud &cloud, const PressureProblem &pressure,
+                        ViscousProblem &problem);
 
 struct ViscousResult {
   int iterations = 0; // of the linear solver

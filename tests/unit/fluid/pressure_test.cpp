@@ -33,7 +33,8 @@ struct Problem {
     params.density = density;
     params.row_guard = guard;
     predicted = frozen.values(velocity);
-    assemble_pressure(frozen.points, frozen.cloud, params, predicted, target, dt, pressure);
+    assemble_pressure_operators(frozen.points, frozen.cloud, params, pressure);
+    assemble_pressure_source(frozen.points, frozen.cloud, params, predicted, target, dt, pressure);
     set_wall_velocity(frozen.walls, frozen.cloud, params, dt, pressure);
   }
   double row_times(int i, const std::vector<double> &p) const {
