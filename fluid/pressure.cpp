@@ -284,13 +284,12 @@ private:
   }
 
   // False when the cloud hardly determines the quadratic: on a lattice the functionals have a norm
-  // of 2.5 / h, next to walls 11 / h; beyond the limit they amplify the noise of single points.
+  // of 2.5 / h, next to walls 15 / h; beyond the limit they amplify the noise of single points.
   bool set_quadratic_gradient(const Stencil &s, const QuadraticFit &fit) const {
-    constexpr double largest_norm = 20;
     auto &gradient = problem_.gradient[s.i];
     gradient.col(0) = fit.solve({1 / s.h, 0, 0, 0, 0});
     gradient.col(1) = fit.solve({0, 1 / s.h, 0, 0, 0});
-    return gradient.norm() * s.h < largest_norm;
+    return gradient.norm() * s.h < params_.gradient_guard;
   }
 
   void set_wall_rows(const Stencil &s, const std::array<double, 3> &laplacian) const {

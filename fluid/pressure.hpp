@@ -54,6 +54,7 @@ struct PressureProblem {
 struct PressureParams {
   double density = 1000;       // [kg/m^3]
   double row_guard = 0.1;      // largest ratio of negative to positive weights in a row
+  double gradient_guard = 20;  // largest norm of a gradient's functional, times the kernel radius
 };
 
 /// Assembles matrix and gradient functionals, which the cloud alone decides.

@@ -30,6 +30,7 @@ struct FluidParams {
   int time_order = 1;
   double pressure_tolerance = 1e-7;
   double row_guard = 0.1;
+  double gradient_guard = 20;
   double noise_damping = 0.5;
   MotionParams motion;
   Rheology rheology; // from table [fluid.rheology] and `viscosity`
@@ -63,6 +64,9 @@ struct FluidParams {
         .at_least(1e-12)
         .at_most(1e-2);
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
+    read("gradient_guard", gradient_guard,
+         "largest norm of a pressure gradient's functional, times the kernel radius")
+        .positive();
     read("noise_damping", noise_damping,
          "decay of velocity modes at the scale of the points, in units of the pace")
         .at_least(0);

@@ -14,6 +14,7 @@ FluidSolver::FluidSolver(const Scene &scene)
     : state(scene.initial), walls(scene.walls), params_(scene.params) {
   pressure_params_.density = params_.density;
   pressure_params_.row_guard = params_.row_guard;
+  pressure_params_.gradient_guard = params_.gradient_guard;
   cloud_.has_air = params_.free_surface;
   nodal_forces_.assign(walls.position.size(), Vec<2>::Zero());
 }
