@@ -154,7 +154,7 @@ std::string what_failed(int status, const std::string &log, const fs::path &resu
 } // namespace
 
 Ccx::Ccx(const std::string &program, int threads, fs::path folder)
-    : program_(find_program(program)), threads_(threads), folder_(fs::absolute(folder)) {}
+    : program_(find_program(program)), threads_(threads), folder_(std::move(folder)) {}
 
 void Ccx::run(const std::string &job, const std::string &task) {
   const fs::path result = folder_ / (job + ".rout"), log = folder_ / (job + ".log");

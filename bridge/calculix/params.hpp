@@ -37,7 +37,10 @@ struct BoxParams {
         .one_of({"left", "right", "lower", "upper"});
     read("element", element, "incompatible-modes (C3D8I) or q1 (C3D8, locks)")
         .one_of({"incompatible-modes", "q1"});
-    read("material", material, "law of *ELASTIC at finite strain").one_of({"st-venant-kirchhoff"});
+    read("material", material, "the law of *ELASTIC at finite strain")
+        .check(material == "st-venant-kirchhoff",
+               "is no law of the box: ccx's *ELASTIC at finite strain is st-venant-kirchhoff; give "
+               "other laws in a model of your own (solid.input)");
     read.required("density_kg_m3", density, "mass per reference volume").positive();
     read.required("youngs_modulus_pa", youngs_modulus, "of small strains").positive();
     read.required("poisson_ratio", poisson_ratio, "of small strains")
@@ -52,7 +55,7 @@ struct BoxParams {
 };
 
 struct CalculixParams {
-  std::string program = "sluice-calculix";
+  std::string program;
   std::string ccx = "ccx";
   int threads = 1;
   int dimension = 2;
@@ -62,7 +65,8 @@ struct CalculixParams {
   BoxParams box;             ///< without `input`
 
   template <class Reader> void describe(Reader &read) {
-    read("program", program, "which program plays the solid").one_of({"sluice-calculix"});
+    read.required("program", program, "which program plays the solid")
+        .check(program == "sluice-calculix", "asks for another program than this, sluice-calculix");
     read("ccx", ccx, "CalculiX: a name on PATH, or a path");
     read("threads", threads, "of ccx; more than one pays from some ten thousand unknowns on")
         .at_least(1);

@@ -41,7 +41,7 @@ fs::path made(const fs::path &folder) {
   fs::create_directories(folder, error);
   check(!error, "{}: cannot be made ({}); give another --out folder", folder.string(),
         error.message());
-  return folder;
+  return fs::absolute(folder);
 }
 
 } // namespace
