@@ -35,7 +35,8 @@ void print_box(const sluice::Config &config) {
 void run(const Options &options) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
-  config.allow_tables({"case", "bridge", "fluid", "fluid.wall", "fluid.gauge", "solid"});
+  // The fluid knows its own sub-tables.
+  config.allow_tables({"case", "parameters", "bridge", "fluid", "fluid.*", "solid"});
   if (options.print_box)
     return print_box(config);
   if (options.check_only)

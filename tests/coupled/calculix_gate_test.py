@@ -57,9 +57,9 @@ class CalculixGateTest(unittest.TestCase):
     def test_ccx_and_the_deal_ii_solver_move_alike(self):
         """Same element and law; windows are converged to 1e-4 of their increment and the time
         integrators differ in their damping and in the acceleration that they start from."""
-        for element, length in (("q1", SHORT), ("incompatible-modes", COARSE)):
+        for element, end in (("q1", 0.01), ("incompatible-modes", 0.02)):
             with self.subTest(element=element):
-                settings = length + [f"solid.element={element}",
+                settings = COARSE + [f"case.end_time_s={end}", f"solid.element={element}",
                                      "solid.material=st-venant-kirchhoff"]
                 ours = self.tip(self.completed(settings, name=f"deal.II-{element}"))
                 out = self.completed(settings + CCX, name=f"ccx-{element}")
