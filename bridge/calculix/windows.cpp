@@ -3,7 +3,7 @@
 
 #include "bridge/base/check.hpp"
 
-#include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 
@@ -46,7 +46,11 @@ fs::path made(const fs::path &folder) {
 
 } // namespace
 
-std::string as_ccx_reads(double value) { return fmt::format("{:.13e}", value); }
+std::string as_ccx_reads(double value) {
+  // an exponent of three digits would be cut to two: -1e-100 is read as -1e-10
+  const double readable = std::abs(value) < 1e-99 ? 0 : value;
+  return fmt::format("{:.13e}", readable);
+}
 double rounded_as_ccx_reads(double value) {
   return std::strtod(as_ccx_reads(value).c_str(), nullptr);
 }

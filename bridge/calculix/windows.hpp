@@ -43,7 +43,8 @@ private:
   double time_ = 0, end_time_ = 0; // [s] at the start of the window, after the last solve
 };
 
-/// What ccx reads of a force or a time: it takes 20 characters, so 14 significant digits.
+/// What ccx reads of a force or a time: it takes 20 characters, so 14 significant digits, and sizes
+/// from 1e-99 (below: zero) to 1e100.
 std::string as_ccx_reads(double value);
 double rounded_as_ccx_reads(double value);
 
