@@ -114,8 +114,8 @@ std::vector<Participant> participants_of(const Config &config, const fs::path &f
   std::vector<Participant> found;
   for (const Role &role : roles)
     if (config.has_table(role.table) && (role.table == "fluid" || is_coupled))
-      found.push_back({std::string(role.table),
-                       find_program(role.table, program_of(role, config), folder)});
+      found.push_back(
+          {std::string(role.table), find_program(role.table, program_of(role, config), folder)});
   return found;
 }
 
