@@ -9,6 +9,7 @@
 namespace sluice::solid {
 
 struct SolidParams {
+  std::string program = "sluice-solid";
   int dimension = 2;
   Vec<2> corner{0, 0};     ///< [m] lower left corner
   double width = 0;        ///< [m] along x
@@ -28,6 +29,8 @@ struct SolidParams {
   int newton_max_iterations = 25;
 
   template <class Reader> void describe(Reader &read) {
+    read("program", program, "which program plays the solid")
+        .check(program == "sluice-solid", "asks for another program than this, sluice-solid");
     describe_geometry(read);
     read("element", element, "incompatible-modes, q1 (locks) or q2")
         .one_of({"incompatible-modes", "q1", "q2"});

@@ -126,6 +126,17 @@ class CompleteRunTest(LauncherTest):
                      "OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"):
             self.assertIn(line, said)
 
+    def test_a_table_may_name_another_program(self):
+        self.program("calculix", WELL.replace("${part}", "solid") + "echo calculix speaks\n")
+        done = self.run_case("--set", "solid.program=sluice-calculix")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("calculix speaks", (self.out / "solid.log").read_text())
+        self.assertEqual(self.summary()["steps"], 3)
+        done = self.run_case("--set", "solid.program=sluice-nobody")
+        self.assertIn("[solid] needs the program sluice-nobody", done.stderr)
+        self.assertIn(str(self.folder), done.stderr)
+        self.assertIn("must be a name", self.run_case("--set", "solid.program=/bin/true").stderr)
+
     def test_case_with_one_participant_starts_that_one_only(self):
         self.case.write_text(CASE[:CASE.index("[solid]")])
         self.assertEqual(self.run_case().returncode, 0)
