@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/diagnostics.hpp"
 
+#include "fluid/parallel.hpp"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -10,17 +13,28 @@ namespace sluice::fluid {
 Integrals integrate(const FluidState &state, const FluidParams &params) {
   const Points &points = state.points;
   const double area = params.spacing * params.spacing, mass = params.density * area;
+  std::array<double, Blocks::max_count> fastest{};
+  const auto sums = block_sums<4>(points.size(), [&](IndexRange range) {
+    std::array<double, 4> part{};
+    double &speed2 = fastest[Blocks(points.size()).of(range.begin)];
+    for (int i = range.begin; i < range.end; ++i) {
+      const Vec<2> &u = points.velocity[i];
+      const Vec<2> x =
+          points.position[i] + 0.5 * state.step_size * (u - points.previous_velocity[i]);
+      part[0] += u.squaredNorm();
+      part[1] -= params.gravity.dot(x);
+      part[2] += u.x();
+      part[3] += u.y();
+      speed2 = std::max(speed2, u.squaredNorm());
+    }
+    return part;
+  });
   Integrals total;
+  total.kinetic = 0.5 * mass * sums[0];
+  total.potential = mass * sums[1];
+  total.momentum = mass * Vec<2>(sums[2], sums[3]);
   total.point_volume = points.size() * area;
-  for (int i = 0; i < points.size(); ++i) {
-    const Vec<2> &u = points.velocity[i];
-    const Vec<2> x =
-        points.position[i] + 0.5 * state.step_size * (u - points.previous_velocity[i]);
-    total.kinetic += 0.5 * mass * u.squaredNorm();
-    total.potential -= mass * params.gravity.dot(x);
-    total.momentum += mass * u;
-    total.max_speed = std::max(total.max_speed, u.norm());
-  }
+  total.max_speed = std::sqrt(*std::max_element(fastest.begin(), fastest.end()));
   return total;
 }
 

@@ -52,11 +52,11 @@ Mat<2> outer(const Vec<2> &a, const Vec<2> &b) { return a * b.transpose(); }
 
 // --- stencils ---------------------------------------------------------------------------------
 
-/// Builds the rows of one point.
-class StencilBuilder {
-public:
-  enum class Kind { quadratic, linear, surface, pairs };
+enum class Kind { quadratic, linear, surface, pairs };
 
+/// Builds the rows of one point, with or without those of the gradient.
+template <bool with_gradient> class StencilBuilder {
+public:
   StencilBuilder(const Points &points, const Cloud &cloud, const PressureProblem &pressure,
                  ViscousProblem &problem)
       : points_(points), cloud_(cloud), pressure_(pressure), problem_(problem) {}
@@ -120,11 +120,14 @@ private:
   void pressures_row(const Row &row) const {
     const double *weights = &pressure_.matrix.value[pressure_.matrix.row_start[row.i] + 1];
     const double scale = -1 / (cloud_.spacing * cloud_.spacing);
-    const auto &functional = pressure_.gradient[row.i];
-    for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
-      const Vec<2> q = scaled(row.i, points_.position[row.neighbours[k]]);
+    for (std::size_t k = 0; k < row.neighbours.size(); ++k)
       row.laplacian[k] = scale * weights[k];
-      row.gradient[k] = weight_at(q) * (functional.transpose() * quadratic_basis(q));
+    if constexpr (with_gradient) {
+      const auto &functional = pressure_.gradient[row.i];
+      for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
+        const Vec<2> q = scaled(row.i, points_.position[row.neighbours[k]]);
+        row.gradient[k] = weight_at(q) * (functional.transpose() * quadratic_basis(q));
+      }
     }
   }
 
@@ -412,6 +415,8 @@ public:
       const double mean = 0.5 * (mu + problem_.viscosity[j]);
       if (is_open)
         visit(j, Mat<2>(mean * problem_.block[start + k]));
+      else if (is_uniform_) // no gradients were made
+        visit(j, Mat<2>(mean * problem_.laplacian[start + k] * Mat<2>::Identity()));
       else
         visit(j, Mat<2>(mean * problem_.laplacian[start + k] * Mat<2>::Identity() +
                         outer(problem_.gradient[start + k], slope)));
@@ -617,20 +622,14 @@ double shear_rate(const Mat<2> &gradient) {
   return (gradient + gradient.transpose()).norm() / std::sqrt(2.0);
 }
 
-void build_viscous_rows(const Points &points, const Cloud &cloud, const PressureProblem &pressure,
-                        ViscousProblem &problem) {
-  const int n = points.size();
-  problem.start.resize(n + 1);
-  problem.start[0] = 0;
-  for (int i = 0; i < n; ++i)
-    problem.start[i + 1] = problem.start[i] + cloud.neighbours.count[i];
-  problem.laplacian.resize(problem.start[n]);
-  problem.gradient.resize(problem.start[n]);
-  problem.block.resize(problem.start[n]);
-  problem.wall_weights.assign(cloud.point_walls.size(), {});
-  const StencilBuilder builder(points, cloud, pressure, problem);
+namespace {
+
+template <bool with_gradient>
+void build_rows(const Points &points, const Cloud &cloud, const PressureProblem &pressure,
+                ViscousProblem &problem) {
+  const StencilBuilder<with_gradient> builder(points, cloud, pressure, problem);
   const auto counts = block_sums<4>(
-      n,
+      points.size(),
       [&](IndexRange range) {
         std::array<double, 4> count{};
         for (int i = range.begin; i < range.end; ++i)
@@ -640,6 +639,25 @@ void build_viscous_rows(const Points &points, const Cloud &cloud, const Pressure
       Work::heavy);
   problem.rows = {static_cast<int>(counts[0]), static_cast<int>(counts[1]),
                   static_cast<int>(counts[2]), static_cast<int>(counts[3])};
+}
+
+} // namespace
+
+void build_viscous_rows(const Points &points, const Cloud &cloud, const Rheology &rheology,
+                        const PressureProblem &pressure, ViscousProblem &problem) {
+  const int n = points.size();
+  problem.start.resize(n + 1);
+  problem.start[0] = 0;
+  for (int i = 0; i < n; ++i)
+    problem.start[i + 1] = problem.start[i] + cloud.neighbours.count[i];
+  problem.laplacian.resize(problem.start[n]);
+  problem.gradient.resize(problem.start[n]);
+  problem.block.resize(problem.start[n]);
+  problem.wall_weights.assign(cloud.point_walls.size(), {});
+  if (rheology.is_newtonian())
+    build_rows<false>(points, cloud, pressure, problem);
+  else
+    build_rows<true>(points, cloud, pressure, problem);
 }
 
 ViscousResult diffuse_velocity(const Points &points, const Walls &walls, const Cloud &cloud,

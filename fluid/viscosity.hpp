@@ -60,9 +60,10 @@ struct ViscousProblem {
 };
 
 /// Stencils of a frozen cloud; once per step. Away from walls and surfaces they are those of the
-/// pressure, whose operators must be assembled.
-void build_viscous_rows(const Points &points, const Cloud &cloud, const PressureProblem &pressure,
-                        ViscousProblem &problem);
+/// pressure, whose operators must be assembled. A Newtonian fluid gets no gradients there: its law
+/// does not look at them.
+void build_viscous_rows(const Points &points, const Cloud &cloud, const Rheology &rheology,
+                        const PressureProblem &pressure, ViscousProblem &problem);
 
 struct ViscousResult {
   int iterations = 0; // of the linear solver

@@ -55,9 +55,13 @@ struct Wall {
   }
 };
 
+bool walls_are_held(const Config &config) {
+  return config.peek<FluidWalls>("fluid").coupled_walls != "move";
+}
+
 bool fluid_has_partner(const Config &config) {
   const auto walls = config.peek_all<Wall>("fluid.wall");
-  return config.peek<FluidWalls>("fluid").coupled_walls == "move" &&
+  return !walls_are_held(config) &&
          std::any_of(walls.begin(), walls.end(), [](const Wall &wall) { return wall.coupled; });
 }
 
@@ -111,6 +115,14 @@ std::vector<Participant> participants_of(const Config &config, const fs::path &f
         "run sluice-solid --alone",
         config.file_name());
   const bool is_coupled = fluid_has_partner(config);
+  check(!is_coupled || config.has_table("solid"),
+        "{}: a wall is coupled, but there is no [solid] table; give it one, or hold the walls with "
+        "fluid.coupled_walls = \"stay\"",
+        config.file_name());
+  check(is_coupled || !config.has_table("solid") || walls_are_held(config),
+        "{}: there is a [solid] table, but no [[fluid.wall]] has coupled = true: nothing would move "
+        "with it",
+        config.file_name());
   std::vector<Participant> found;
   for (const Role &role : roles)
     if (config.has_table(role.table) && (role.table == "fluid" || is_coupled))

@@ -9,9 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
+from run_folder import RunError
+
 REFERENCE = Path(__file__).resolve().parent / "reference"
 CENTRE_BAND = 0.005
 STEADY_BAND = 1e-4           # change of the profiles per unit of time
+JUDGED_FROM = 10.0           # before, the flow is still setting in
 SIDE_LENGTH = 1.0
 
 
@@ -90,6 +93,9 @@ def read_reference(cavity):
 def read_profiles(run):
     """{time: Profiles} of a run."""
     lines = {name: run.series(f"probe_{name}.csv") for name in ("ab", "cd")}
+    if len(lines["ab"]["time_s"]) == 0:
+        raise RunError(f"{run.path}: no profile was written; the run ended before its first output "
+                       "at case.output_interval_s")
     result = {}
     for time in np.unique(lines["ab"]["time_s"]):
         velocity = {}
@@ -110,10 +116,10 @@ def largest_difference(profiles, reference):
 
 
 def rate_of_change(history):
-    """Largest change of a profile per unit of time between the last two outputs."""
+    """Largest change of a profile per unit of time between the last two outputs; None without two."""
     times = sorted(history)
     if len(times) < 2:
-        return math.inf
+        return None
     last, before = history[times[-1]], history[times[-2]]
     change = max(np.abs(last.ab - before.ab).max(), np.abs(last.cd - before.cd).max())
     return change / (times[-1] - times[-2])
