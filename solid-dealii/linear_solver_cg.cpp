@@ -15,11 +15,13 @@
 namespace sluice::solid {
 namespace {
 
-// Debian's ML wants MPI even for one process; nothing else here does.
+// Debian's ML wants MPI even for one process; nothing else here does. Open MPI would start a daemon
+// for a process on its own unless told that it stays alone.
 MPI_Comm own_process() {
   int is_initialised = 0;
   MPI_Initialized(&is_initialised);
   if (is_initialised == 0) {
+    setenv("OMPI_MCA_ess_singleton_isolated", "1", 0);
     MPI_Init(nullptr, nullptr);
     std::atexit([] { MPI_Finalize(); });
   }

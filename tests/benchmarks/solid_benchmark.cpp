@@ -82,9 +82,9 @@ double relative_rms(const std::vector<double> &a, const std::vector<double> &fin
 }
 
 void gate_table() {
-  const GateResult finest = gate_result("q3", 8, 128, 0);
-  const GateResult fine = gate_result("q3", 2, 56, 1e-4);
-  std::printf("q3 8x128: tip %.4f %.4f mm;  q3 2x56: tip %.4f %.4f mm, f %.4f %.3f %.3f Hz\n",
+  const GateResult finest = gate_result("q3", 4, 64, 0);
+  const GateResult fine = gate_result("q3", 1, 56, 1e-4);
+  std::printf("q3 4x64: tip %.4f %.4f mm;  q3 1x56: tip %.4f %.4f mm, f %.4f %.3f %.3f Hz\n",
               1e3 * finest.ux, 1e3 * finest.uy, 1e3 * fine.ux, 1e3 * fine.uy, fine.f[0], fine.f[1],
               fine.f[2]);
   for (const auto &[element, across, along] : {std::tuple{"incompatible-modes", 1, 28},
@@ -94,7 +94,7 @@ void gate_table() {
                                                {"q2", 1, 28},
                                                {"q3", 1, 28}}) {
     const GateResult r = gate_result(element, across, along, 2e-4);
-    std::printf("%-18s %dx%-3d tip %.4f %.4f mm (%+.2f %% of q3 8x128), f %.4f %.3f %.3f Hz (%+.2f "
+    std::printf("%-18s %dx%-3d tip %.4f %.4f mm (%+.2f %% of q3 4x64), f %.4f %.3f %.3f Hz (%+.2f "
                 "%+.2f %+.2f %%), release %.2f %% rms\n",
                 element, across, along, 1e3 * r.ux, 1e3 * r.uy, 100 * (r.ux / finest.ux - 1),
                 r.f[0], r.f[1], r.f[2], 100 * (r.f[0] / fine.f[0] - 1),
@@ -188,6 +188,8 @@ void cook_table() {
                                        {"q3", "neo-hookean-split"}}) {
       std::printf("%-18s %-18s %.4f:", element, law, nu);
       for (const int n : {2, 4, 8, 16, 32}) {
+        if (n == 32 && std::strcmp(element, "q3") == 0)
+          continue; // 19,000 unknowns by a direct solver
         std::printf(" %.4f", cook(element, law, nu, n));
         std::fflush(stdout);
       }

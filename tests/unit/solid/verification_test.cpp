@@ -3,6 +3,7 @@
 // the elastica, a slender beam. Finer meshes of the same: tests/benchmarks/solid_benchmark.cpp.
 #include "gate.hpp"
 
+#include "bridge/mapping_projection.hpp"
 #include "solid-dealii/cell_system.hpp"
 #include "solid-dealii/interface.hpp"
 
@@ -128,6 +129,57 @@ TEST(ManufacturedSolution, mixed_element_keeps_its_order_next_to_incompressibili
   EXPECT_GT(observed_order(ElementKind::q2_p1, make_material("neo-hookean-split", 1, 0.3)), 2.9);
   // The field changes volume by a third: at nu = 0.49 that takes pressures of 17 E.
   EXPECT_GT(observed_order(ElementKind::q2_p1, make_material("neo-hookean-split", 1, 0.49)), 2.7);
+}
+
+// ---- patch test under mapped tractions ----------------------------------------------------------
+
+// A square between two symmetry planes, pulled to the right by a uniform traction that comes from a
+// partner's mesh of `n_partner` segments through the bridge's map. Returns the largest difference
+// of the displacement to the uniform state, relative to its largest value.
+double mapped_patch_error(int n_solid, int n_partner) {
+  SolidParams p;
+  p.width = p.height = 1;
+  p.elements_across = p.elements_along = n_solid;
+  p.element = "incompatible-modes";
+  p.density = 1;
+  p.youngs_modulus = 1000;
+  p.poisson_ratio = 0.3;
+  p.boundaries = {{"left", "symmetry", {}}, {"lower", "symmetry", {}}, {"right", "wetted", {}}};
+  const double traction = 50;
+  SolidSolver<2> solver(p);
+  const auto surface = wetted_interface(solver.discretisation(), solver.supports().wetted);
+  bridge::InterfaceMesh partner;
+  std::vector<double> forces(static_cast<std::size_t>(2 * (n_partner + 1)), 0.0);
+  for (int k = 0; k <= n_partner; ++k) {
+    partner.positions.insert(partner.positions.end(), {1, double(k) / n_partner});
+    if (k < n_partner)
+      partner.faces.insert(partner.faces.end(), {k + 1, k});
+    forces[static_cast<std::size_t>(2 * k)] =
+        traction / n_partner * (k == 0 || k == n_partner ? 0.5 : 1);
+  }
+  const auto map = bridge::projection_map(partner, surface.mesh);
+  const auto state = solver.solve_static(
+      surface.scatter(map.conservative(forces), solver.discretisation().n_dofs()));
+  p.boundaries[2].kind = "free";
+  p.boundaries[2].traction = {traction, 0};
+  SolidSolver<2> exact(p);
+  const auto uniform = exact.solve_static(Eigen::VectorXd::Zero(state.displacement.size()));
+  return (state.displacement - uniform.displacement).cwiseAbs().maxCoeff() /
+         uniform.displacement.cwiseAbs().maxCoeff();
+}
+
+// Where the partner's nodes are among the solid's (or refine them) the forces are exact; elsewhere
+// they are a rule of quadrature whose error in a nodal force is at most 0.75 (h/H)^2 of it: one
+// kink of the solid's shape function in a segment costs h^2/8 times the jump of its slope, and it
+// has three.
+TEST(Patch, a_uniform_traction_through_the_bridge_gives_uniform_stress) {
+  EXPECT_LT(mapped_patch_error(4, 4), 1e-8) << "Newton's tolerance";
+  EXPECT_LT(mapped_patch_error(4, 12), 1e-8);
+  for (const int n : {7, 18, 37}) {
+    const double error = mapped_patch_error(4, n);
+    std::printf("%d segments on 4 cells: %.2e of the displacement\n", n, error);
+    EXPECT_LT(error, 0.75 * 16.0 / (n * n));
+  }
 }
 
 // ---- Cook's membrane ----------------------------------------------------------------------------
