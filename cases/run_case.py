@@ -151,11 +151,18 @@ def build():
     print(f"built in {time.monotonic() - started:.0f} s")
 
 
+def set_options(overrides):
+    return [part for text in overrides for part in ("--set", text)]
+
+
 def run_solvers(options, folder):
+    """The launcher runs a coupled case; a case of one solver brings its own `solve`."""
     file, overrides = case_file(options, folder)
+    own = CASES / options.case / "solve"
+    if own.is_file():
+        return call_through_signals([str(own), str(folder)] + set_options(overrides))
     command = [str(BUILD / "bridge/launcher/sluice"), "run", str(file), "--out", str(folder)]
-    for text in overrides:
-        command += ["--set", text]
+    command += set_options(overrides)
     if options.threads is not None:
         command += ["--threads", str(options.threads)]
     return call_through_signals(command)
