@@ -8,7 +8,9 @@ Acceleration make_acceleration(const BridgeSettings &settings) {
     return ConstantRelaxation(settings.initial_relaxation);
   if (settings.acceleration == "aitken")
     return Aitken(settings.initial_relaxation);
-  return QuasiNewton(settings.initial_relaxation, settings.windows_reused);
+  if (settings.acceleration == "iqn-imvj")
+    return MultiVector(settings.initial_relaxation, settings.windows_reused, settings.filter);
+  return QuasiNewton(settings.initial_relaxation, settings.windows_reused, settings.filter);
 }
 
 AcceleratedIterate accelerate(Acceleration &acceleration, const Eigen::VectorXd &iterate,
@@ -21,6 +23,10 @@ void finish_window(Acceleration &acceleration, const Eigen::VectorXd &iterate,
                    const Eigen::VectorXd &solved, double resolution) {
   std::visit([&](auto &chosen) { chosen.finish_window(iterate, solved, resolution); },
              acceleration);
+}
+
+void forget_window(Acceleration &acceleration) {
+  std::visit([](auto &chosen) { chosen.forget_window(); }, acceleration);
 }
 
 } // namespace sluice::bridge

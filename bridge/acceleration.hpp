@@ -4,6 +4,7 @@
 #pragma once
 
 #include "bridge/acceleration_aitken.hpp"
+#include "bridge/acceleration_imvj.hpp"
 #include "bridge/acceleration_iqn.hpp"
 #include "bridge/settings.hpp"
 
@@ -19,12 +20,13 @@ public:
     return {iterate + relaxation_ * (solved - iterate), relaxation_, 0};
   }
   void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, double) {}
+  void forget_window() {}
 
 private:
   double relaxation_;
 };
 
-using Acceleration = std::variant<ConstantRelaxation, Aitken, QuasiNewton>;
+using Acceleration = std::variant<ConstantRelaxation, Aitken, QuasiNewton, MultiVector>;
 
 /// The accelerator that `settings` names.
 Acceleration make_acceleration(const BridgeSettings &settings);
@@ -36,5 +38,7 @@ AcceleratedIterate accelerate(Acceleration &acceleration, const Eigen::VectorXd 
 /// The window is accepted with its last iterate and solution: history moves on.
 void finish_window(Acceleration &acceleration, const Eigen::VectorXd &iterate,
                    const Eigen::VectorXd &solved, double resolution);
+/// The window is given up and starts anew.
+void forget_window(Acceleration &acceleration);
 
 } // namespace sluice::bridge

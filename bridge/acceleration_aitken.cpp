@@ -33,4 +33,9 @@ void Aitken::finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, dou
   last_residual_.resize(0);
 }
 
+void Aitken::forget_window() {
+  relaxation_ = initial_relaxation_;
+  last_residual_.resize(0);
+}
+
 } // namespace sluice::bridge

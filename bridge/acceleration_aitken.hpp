@@ -18,13 +18,16 @@ struct AcceleratedIterate {
 
 class Aitken {
 public:
-  explicit Aitken(double initial_relaxation) : relaxation_(initial_relaxation) {}
+  explicit Aitken(double initial_relaxation)
+      : initial_relaxation_(initial_relaxation), relaxation_(initial_relaxation) {}
   AcceleratedIterate next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
                           double = 0);
   void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, double = 0);
+  /// The window starts anew, with the first factor of all.
+  void forget_window();
 
 private:
-  double relaxation_;
+  double initial_relaxation_, relaxation_;
   Eigen::VectorXd last_residual_; // empty at the start of a window
 };
 

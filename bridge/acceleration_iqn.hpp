@@ -7,8 +7,8 @@
 // the fixed-point step, corrected where the columns know how the residual answers.
 // Source: Degroote, Bathe and Vierendeels, Comput. Struct. 87 (2009) 793-801.
 // The columns are orthogonalised from the newest to the oldest; one whose new part is below
-// `filter` of its length only repeats what newer ones say and is left out of this step (QR2 filter
-// of Haelterman et al., Comput. Struct. 171 (2016) 9-17). Without a column: the relaxed step.
+// `filter` of its length only repeats what newer ones say and is left out of this step
+// (least_squares.hpp). Without a column: the relaxed step.
 //
 // Ours: a residual larger than the window's first one says that the columns of earlier windows
 // mislead (they are old, or full of the solvers' noise); they are forgotten at once. On a chain of
@@ -17,6 +17,7 @@
 #pragma once
 
 #include "bridge/acceleration_aitken.hpp"
+#include "bridge/least_squares.hpp"
 
 #include <deque>
 #include <vector>
@@ -33,12 +34,13 @@ public:
                           double resolution = 0);
   void finish_window(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
                      double resolution = 0);
+  /// The window starts anew: what it taught so far is dropped.
+  void forget_window();
 
 private:
   struct Column {
     Eigen::VectorXd residual_change, solution_change;
   };
-  struct LeastSquares;
   void distrust(const Eigen::VectorXd &residual);
   void remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved, double resolution);
   LeastSquares orthogonalised(Eigen::Index most) const;

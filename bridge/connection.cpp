@@ -23,7 +23,7 @@ struct Hello {
 void send_hello(Link &link, Role self, const std::string &token) {
   PayloadWriter payload;
   payload.text(token).text(name_of(self));
-  link.send(FrameType::hello, payload);
+  link.send(FrameType::hello, std::move(payload));
 }
 
 Hello receive_hello(Link &link) {
@@ -146,7 +146,7 @@ std::vector<std::string> lines_of(const std::string &text) {
 void send_case(Link &link, const std::string &text) {
   PayloadWriter payload;
   payload.text(text);
-  link.send(FrameType::case_text, payload);
+  link.send(FrameType::case_text, std::move(payload));
 }
 
 std::string receive_case(Link &link) {

@@ -68,28 +68,36 @@ void FaceTree::search(std::size_t branch, const Vec<3> &p, Nearest &best) const 
   search(a_is_nearer ? b : a, p, best);
 }
 
-Vec<3> FaceTree::node(int number) const {
-  const auto x = mesh_.position(static_cast<std::size_t>(number));
-  return {x[0], x[1], mesh_.dim == 3 ? x[2] : 0.0};
-}
-
-std::span<const int> FaceTree::face(std::size_t number) const {
-  const auto n = static_cast<std::size_t>(mesh_.nodes_per_face);
-  return std::span(mesh_.faces).subspan(n * number, n);
+void FaceTree::find(const Box &box, std::vector<std::size_t> &faces) const {
+  faces.clear();
+  std::vector<std::size_t> pending{0};
+  while (!pending.empty()) {
+    const Branch &here = branches_[pending.back()];
+    pending.pop_back();
+    if (!here.box.intersects(box))
+      continue;
+    if (here.children > 0) {
+      pending.insert(pending.end(), {here.children, here.children + 1});
+      continue;
+    }
+    for (std::size_t k = here.first; k < here.last; ++k)
+      if (box_of(order_[k]).intersects(box))
+        faces.push_back(order_[k]);
+  }
 }
 
 FaceTree::Box FaceTree::box_of(std::size_t number) const {
   Box box;
-  for (const int a : face(number))
-    box.extend(node(a));
+  for (const int a : mesh_.face(number))
+    box.extend(mesh_.point(static_cast<std::size_t>(a)));
   return box;
 }
 
 Projection FaceTree::project(const Vec<3> &p, std::size_t number) const {
   std::array<Vec<3>, 4> x;
-  const auto nodes = face(number);
+  const auto nodes = mesh_.face(number);
   for (std::size_t a = 0; a < nodes.size(); ++a)
-    x[a] = node(nodes[a]);
+    x[a] = mesh_.point(static_cast<std::size_t>(nodes[a]));
   if (nodes.size() == 2)
     return project_on_segment<3>(p, x[0], x[1]);
   if (nodes.size() == 3)

@@ -24,11 +24,11 @@ public:
   /// `p` has three components; the third is zero in 2-D.
   Nearest nearest(const Vec<3> &p) const;
 
-  Vec<3> node(int number) const; ///< [m], third component zero in 2-D
-  std::span<const int> face(std::size_t number) const;
+  /// Numbers of the faces whose bounding boxes meet `box`, in no order that means anything.
+  using Box = Eigen::AlignedBox3d;
+  void find(const Box &box, std::vector<std::size_t> &faces) const;
 
 private:
-  using Box = Eigen::AlignedBox3d;
   struct Branch {
     Box box;
     std::size_t first, last; // faces order_[first..last)

@@ -2,6 +2,7 @@
 #include "bridge/interface_mesh.hpp"
 
 #include "bridge/base/check.hpp"
+#include "bridge/facets.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -20,8 +21,7 @@ void check_shape(const InterfaceMesh &mesh, std::string_view owner) {
         mesh.nodes_per_face, mesh.dim);
   const auto d = static_cast<std::size_t>(mesh.dim),
              n = static_cast<std::size_t>(mesh.nodes_per_face);
-  check(!mesh.positions.empty() && mesh.positions.size() % d == 0 && !mesh.faces.empty() &&
-            mesh.faces.size() % n == 0,
+  check(!mesh.positions.empty() && mesh.positions.size() % d == 0 && mesh.faces.size() % n == 0,
         "bridge: the {}'s interface mesh has {} coordinates and {} face nodes", owner,
         mesh.positions.size(), mesh.faces.size());
 }
@@ -33,17 +33,12 @@ void check_positions(const InterfaceMesh &mesh, std::string_view owner) {
 }
 
 double distance(const InterfaceMesh &mesh, int a, int b) {
-  const auto x = mesh.position(static_cast<std::size_t>(a));
-  const auto y = mesh.position(static_cast<std::size_t>(b));
-  double sum = 0;
-  for (std::size_t d = 0; d < x.size(); ++d)
-    sum += (x[d] - y[d]) * (x[d] - y[d]);
-  return std::sqrt(sum);
+  return (mesh.point(static_cast<std::size_t>(a)) - mesh.point(static_cast<std::size_t>(b))).norm();
 }
 
 void check_face(const InterfaceMesh &mesh, std::size_t face, std::string_view owner) {
-  const auto n = static_cast<std::size_t>(mesh.nodes_per_face);
-  const auto nodes = std::span(mesh.faces).subspan(n * face, n);
+  const auto nodes = mesh.face(face);
+  const std::size_t n = nodes.size();
   for (const int a : nodes)
     check(a >= 0 && static_cast<std::size_t>(a) < mesh.n_nodes(),
           "bridge: face {} of the {}'s interface mesh names node {}; there are {}", face, owner, a,
@@ -74,6 +69,24 @@ double extent(const InterfaceMesh &mesh) {
     sum += (high - low) * (high - low);
   }
   return std::sqrt(sum);
+}
+
+double longest_edge(const InterfaceMesh &mesh, std::size_t face) {
+  const auto nodes = mesh.face(face);
+  double longest = 0;
+  for (std::size_t a = 0; a < nodes.size(); ++a)
+    longest = std::max(longest, distance(mesh, nodes[a], nodes[(a + 1) % nodes.size()]));
+  return longest;
+}
+
+std::vector<double> node_areas(const InterfaceMesh &mesh) {
+  std::vector<double> areas(mesh.n_nodes(), 0.0);
+  for (std::size_t f = 0; f < mesh.n_faces(); ++f)
+    for (const Facet &facet : facets_of(mesh, f))
+      for (std::size_t a = 0; a < mesh.face(f).size(); ++a)
+        areas[static_cast<std::size_t>(mesh.face(f)[a])] +=
+            facet.area() * facet.mean_weight(static_cast<Eigen::Index>(a));
+  return areas;
 }
 
 } // namespace sluice::bridge

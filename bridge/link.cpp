@@ -5,6 +5,7 @@
 #include "bridge/base/timer.hpp"
 
 #include <algorithm>
+#include <cstring>
 
 namespace sluice::bridge {
 
@@ -13,6 +14,7 @@ namespace {
 constexpr std::size_t longest_last_message = 1 << 16; // [bytes]
 constexpr std::size_t chunk = 1 << 20;                // [bytes] memory grows by what has arrived
 constexpr std::size_t largest_frame = 1 << 30;        // [bytes]
+constexpr std::size_t inbox_size = 1 << 14;           // [bytes]
 
 // No byte for the whole silence deadline.
 class Silence : public std::runtime_error {
@@ -25,7 +27,7 @@ public:
 Link::Link(std::unique_ptr<Transport> transport, std::string self, std::string partner,
            double silence_deadline)
     : transport_(std::move(transport)), self_(std::move(self)), partner_(std::move(partner)),
-      silence_deadline_(silence_deadline) {}
+      silence_deadline_(silence_deadline), inbox_(inbox_size) {}
 
 Link::~Link() { stop_heartbeat(); }
 
@@ -48,17 +50,17 @@ void Link::beat(std::stop_token stop) {
   while (!rest_.wait_for(resting, stop, period, [] { return false; }) && !stop.stop_requested()) {
     const std::unique_lock sending(sending_, std::try_to_lock);
     try {
+      PayloadWriter nothing;
       if (sending.owns_lock() && transport_->can_write())
-        send_frame(FrameType::heartbeat, {}, silence_deadline_);
+        send_frame(FrameType::heartbeat, nothing, silence_deadline_);
     } catch (const std::exception &) {
       return; // the main thread finds out by itself, with more to say
     }
   }
 }
 
-void Link::send_frame(FrameType type, std::span<const std::byte> payload, double patience) {
-  const Bytes frame = encode_frame(type, sent_, payload);
-  std::span<const std::byte> rest(frame);
+void Link::send_frame(FrameType type, PayloadWriter &payload, double patience) {
+  std::span<const std::byte> rest = payload.frame(type, sent_);
   while (!rest.empty()) {
     const std::size_t n = transport_->write_some(rest, wait_until(patience));
     if (n == 0)
@@ -69,11 +71,11 @@ void Link::send_frame(FrameType type, std::span<const std::byte> payload, double
   ++sent_;
 }
 
-void Link::send(FrameType type, const PayloadWriter &payload) {
+void Link::send(FrameType type, PayloadWriter &&payload) {
   const std::string activity = fmt::format("sent its {} frame", name_of(type));
   try {
     const std::lock_guard lock(sending_);
-    send_frame(type, payload.bytes(), silence_deadline_);
+    send_frame(type, payload, silence_deadline_);
   } catch (const ConnectionLost &lost) {
     report_loss(activity, lost.what());
   } catch (const Silence &) {
@@ -87,7 +89,7 @@ void Link::send_abort(std::string_view message) noexcept {
     PayloadWriter payload;
     payload.text(message.substr(0, longest_last_message - 8));
     const std::lock_guard lock(sending_);
-    send_frame(FrameType::abort, payload.bytes(), 0.2);
+    send_frame(FrameType::abort, payload, 0.2);
   } catch (...) { // the partner is gone already: nobody to tell
   }
 }
@@ -154,12 +156,24 @@ Bytes Link::read_payload(const FrameHeader &header, std::size_t limit) {
 
 void Link::read_all(std::span<std::byte> bytes) {
   while (!bytes.empty()) {
-    const std::size_t n = transport_->read_some(bytes, wait_until(silence_deadline_));
-    if (n == 0)
-      throw Silence();
-    bytes = bytes.subspan(n);
-    bytes_received_ += n;
+    if (inbox_read_ == inbox_end_ && bytes.size() < inbox_size) {
+      inbox_end_ = read_some(inbox_);
+      inbox_read_ = 0;
+    }
+    const std::size_t waiting = std::min(inbox_end_ - inbox_read_, bytes.size());
+    if (waiting > 0)
+      std::memcpy(bytes.data(), inbox_.data() + inbox_read_, waiting);
+    inbox_read_ += waiting;
+    bytes = bytes.subspan(waiting > 0 ? waiting : read_some(bytes));
   }
+}
+
+std::size_t Link::read_some(std::span<std::byte> bytes) {
+  const std::size_t n = transport_->read_some(bytes, wait_until(silence_deadline_));
+  if (n == 0)
+    throw Silence();
+  bytes_received_ += n;
+  return n;
 }
 
 Deadline Link::wait_until(double patience) const {

@@ -38,7 +38,7 @@ public:
   void stop_heartbeat();
 
   /// Sends one frame. Throws UserError when the partner is gone or takes nothing in.
-  void send(FrameType type, const PayloadWriter &payload);
+  void send(FrameType type, PayloadWriter &&payload);
   /// Waits for a frame of type `expected` with at most `limit` bytes of payload and returns
   /// `decode(PayloadReader &)`; `awaited` completes "while the fluid awaited ...". Throws UserError
   /// for an abort, silence, the end of the stream or bytes that the protocol does not allow.
@@ -64,12 +64,13 @@ public:
 
 private:
   void beat(std::stop_token stop);
-  void send_frame(FrameType type, std::span<const std::byte> payload, double patience);
+  void send_frame(FrameType type, PayloadWriter &payload, double patience);
   Bytes receive_bytes(FrameType expected, std::size_t limit, std::string_view awaited);
   Bytes next_frame(FrameType expected, std::size_t limit, std::string_view activity);
   FrameHeader read_header();
   Bytes read_payload(const FrameHeader &header, std::size_t limit);
   void read_all(std::span<std::byte> bytes);
+  std::size_t read_some(std::span<std::byte> bytes);
   Deadline wait_until(double patience) const;
   [[noreturn]] void report_abort(std::span<const std::byte> payload,
                                  std::string_view activity) const;
@@ -84,6 +85,8 @@ private:
   std::atomic<std::uint64_t> bytes_sent_ = 0; // by both threads
   std::uint64_t bytes_received_ = 0;
   std::uint64_t sent_ = 0, received_ = 0; // frames
+  Bytes inbox_;                           // a header and a short payload come at one go
+  std::size_t inbox_read_ = 0, inbox_end_ = 0;
 
   std::mutex sending_; // the heartbeat must not cut into a frame
   std::mutex resting_;

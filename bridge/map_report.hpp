@@ -16,6 +16,8 @@ struct MapReport {
   double largest_distance = 0;         ///< [m] from a fluid node to its projection
   std::size_t farthest_node = 0;       ///< the fluid node at that distance
   double row_sum_error = 0;            ///< largest |1 - sum of a row|
+  double largest_offset = 0; ///< [m] max |x_f - H X_s|: moments change by this times force
+  double area_covered = 1;   ///< part of the fluid's surface over the solid's (mortar)
 
   /// Part of the solid's nodes that receives force.
   double coverage() const {

@@ -1,6 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "bridge/mapping.hpp"
 
+#include "bridge/linear_reproduction.hpp"
+#include "bridge/mapping_extruded.hpp"
+#include "bridge/mapping_mortar.hpp"
+#include "bridge/mapping_nearest.hpp"
+#include "bridge/mapping_projection.hpp"
+#include "bridge/mapping_rbf.hpp"
+
 #include <fmt/format.h>
 
 #include <cassert>
@@ -15,34 +22,87 @@ Eigen::Map<const NodeValues> by_node(std::span<const double> values, int dim) {
   return {values.data(), static_cast<Eigen::Index>(values.size()) / dim, dim};
 }
 
-} // namespace
-
-Mapping::Mapping(int dim, Matrix matrix, MapReport report)
-    : dim_(dim), matrix_(std::move(matrix)), report_(report) {}
-
-std::vector<double> Mapping::consistent(std::span<const double> solid_values) const {
-  assert(static_cast<Eigen::Index>(solid_values.size()) == matrix_.cols() * dim_);
-  std::vector<double> result(static_cast<std::size_t>(matrix_.rows() * dim_));
-  Eigen::Map<NodeValues>(result.data(), matrix_.rows(), dim_) =
-      matrix_ * by_node(solid_values, dim_);
+// `factor` times the matrix times each component that both sides have; the others are zero.
+std::vector<double> product(double factor, const Mapping::Matrix &matrix,
+                            std::span<const double> values, int dim_in, int dim_out) {
+  assert(static_cast<Eigen::Index>(values.size()) == matrix.cols() * dim_in);
+  std::vector<double> result(static_cast<std::size_t>(matrix.rows() * dim_out));
+  Eigen::Map<NodeValues> out(result.data(), matrix.rows(), dim_out);
+  if (dim_in == dim_out)
+    out.noalias() = matrix * by_node(values, dim_in);
+  else
+    out.leftCols(2) = matrix * by_node(values, dim_in).leftCols(2);
+  if (factor != 1)
+    out *= factor;
   return result;
 }
 
+} // namespace
+
+Mapping::Mapping(const InterfaceMesh &fluid, const InterfaceMesh &solid, Matrix matrix,
+                 MapReport report, double depth)
+    : fluid_dim_(fluid.dim), solid_dim_(solid.dim), depth_(depth), matrix_(std::move(matrix)),
+      transpose_(matrix_.transpose()), fluid_areas_(node_areas(fluid)),
+      solid_areas_(node_areas(solid)), report_(report) {
+  const Eigen::VectorXd row_sums = matrix_ * Eigen::VectorXd::Ones(matrix_.cols());
+  report_.fluid_nodes = fluid.n_nodes();
+  report_.solid_nodes = solid.n_nodes();
+  report_.row_sum_error = (row_sums.array() - 1).abs().maxCoeff();
+  report_.largest_offset = bridge::largest_offset(matrix_, fluid, solid);
+  report_.solid_nodes_reached = 0;
+  for (int j = 0; j < transpose_.rows(); ++j)
+    report_.solid_nodes_reached += transpose_.row(j).nonZeros() > 0;
+}
+
+std::vector<double> Mapping::consistent(std::span<const double> solid_values) const {
+  return product(1, matrix_, solid_values, solid_dim_, fluid_dim_);
+}
+
 std::vector<double> Mapping::conservative(std::span<const double> fluid_values) const {
-  assert(static_cast<Eigen::Index>(fluid_values.size()) == matrix_.rows() * dim_);
-  std::vector<double> result(static_cast<std::size_t>(matrix_.cols() * dim_));
-  Eigen::Map<NodeValues>(result.data(), matrix_.cols(), dim_) =
-      matrix_.transpose() * by_node(fluid_values, dim_);
-  return result;
+  return product(depth_, transpose_, fluid_values, fluid_dim_, solid_dim_);
+}
+
+std::vector<double> Mapping::traction(std::span<const double> fluid_values) const {
+  std::vector<double> forces(fluid_values.begin(), fluid_values.end());
+  for (std::size_t k = 0; k < forces.size(); ++k)
+    forces[k] *= fluid_areas_[k / static_cast<std::size_t>(fluid_dim_)];
+  std::vector<double> tractions = conservative(forces);
+  for (std::size_t k = 0; k < tractions.size(); ++k)
+    tractions[k] /= solid_areas_[k / static_cast<std::size_t>(solid_dim_)];
+  return tractions;
+}
+
+namespace {
+
+auto maker_of(MapKind kind) {
+  switch (kind) {
+  case MapKind::nearest:
+    return nearest_map;
+  case MapKind::mortar:
+    return mortar_map;
+  case MapKind::rbf:
+    return rbf_map;
+  default:
+    return projection_map;
+  }
+}
+
+} // namespace
+
+Mapping make_mapping(MapKind kind, const InterfaceMesh &fluid, const InterfaceMesh &solid) {
+  if (fluid.dim == 2 && solid.dim == 3)
+    return extruded_map(kind, fluid, solid);
+  return maker_of(kind)(fluid, solid);
 }
 
 std::string MapReport::text() const {
   return fmt::format(
       "map: {} fluid nodes on {} solid nodes, {:.1f} % of the solid nodes reached, "
       "{} fluid nodes beyond the rim, largest distance {:.3g} m (fluid node {}), row "
-      "sums within {:.1g} of one",
+      "sums within {:.1g} of one, linear fields within {:.2g} m, {:.1f} % of the fluid's surface "
+      "covered",
       fluid_nodes, solid_nodes, 100 * coverage(), fluid_nodes_beyond, largest_distance,
-      farthest_node, row_sum_error);
+      farthest_node, row_sum_error, largest_offset, 100 * area_covered);
 }
 
 } // namespace sluice::bridge

@@ -41,32 +41,42 @@ std::string name_of(FrameType type) {
 
 std::uint64_t checksum(std::span<const std::byte> bytes) {
   constexpr std::uint64_t odd = 0x9E3779B97F4A7C15u; // 2^64 / golden ratio
-  std::uint64_t state = bytes.size() * odd + 1;
-  const auto mix = [&](std::uint64_t word) {
+  const auto mix = [](std::uint64_t &state, std::uint64_t word) {
     state = (state ^ word) * odd;
     state ^= state >> 32;
   };
+  std::array<std::uint64_t, 4> chains{1, 2, 3, 4};
   std::size_t k = 0;
-  for (; k + 8 <= bytes.size(); k += 8)
-    mix(get<std::uint64_t>(bytes, k));
-  std::uint64_t last = 0;
+  for (; k + 32 <= bytes.size(); k += 32)
+    for (std::size_t c = 0; c < 4; ++c)
+      mix(chains[c], get<std::uint64_t>(bytes, k + 8 * c));
+  std::array<std::uint64_t, 4> last{};
   if (k < bytes.size())
-    std::memcpy(&last, bytes.data() + k, bytes.size() - k);
-  mix(last);
+    std::memcpy(last.data(), bytes.data() + k, bytes.size() - k);
+  std::uint64_t state = bytes.size() * odd + 1;
+  for (std::size_t c = 0; c < 4; ++c) {
+    mix(chains[c], last[c]);
+    mix(state, chains[c]);
+  }
   return state;
 }
 
-Bytes encode_frame(FrameType type, std::uint64_t sequence, std::span<const std::byte> payload) {
-  Bytes frame(header_size + payload.size());
+void write_header(FrameType type, std::uint64_t sequence, std::span<std::byte> frame) {
+  const std::span<const std::byte> payload = frame.subspan(header_size);
   put(frame, 0, magic);
   put(frame, 4, protocol_version);
   put(frame, 6, static_cast<std::uint16_t>(type));
   put(frame, 8, sequence);
   put(frame, 16, static_cast<std::uint64_t>(payload.size()));
   put(frame, 24, checksum(payload));
-  put(frame, 32, checksum(std::span(frame).first(checked_header_size)));
+  put(frame, 32, checksum(frame.first(checked_header_size)));
+}
+
+Bytes encode_frame(FrameType type, std::uint64_t sequence, std::span<const std::byte> payload) {
+  Bytes frame(header_size + payload.size());
   if (!payload.empty())
     std::memcpy(frame.data() + header_size, payload.data(), payload.size());
+  write_header(type, sequence, frame);
   return frame;
 }
 
@@ -95,7 +105,7 @@ void check_payload(const FrameHeader &header, std::span<const std::byte> payload
 
 void PayloadWriter::append(const void *data, std::size_t size) {
   const auto *first = static_cast<const std::byte *>(data);
-  bytes_.insert(bytes_.end(), first, first + size);
+  frame_.insert(frame_.end(), first, first + size);
 }
 
 PayloadWriter &PayloadWriter::number(std::uint64_t value) {

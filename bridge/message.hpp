@@ -9,17 +9,29 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <span>
 #include <stdexcept>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace sluice::bridge {
 
-using Bytes = std::vector<std::byte>;
+/// Leaves new elements as they are: a buffer that is filled next need not be cleared first.
+template <class T> struct Uninitialised : std::allocator<T> {
+  template <class U> struct rebind { using other = Uninitialised<U>; };
+  template <class U, class... Args> void construct(U *place, Args &&...args) {
+    if constexpr (sizeof...(Args) == 0)
+      ::new (static_cast<void *>(place)) U;
+    else
+      ::new (static_cast<void *>(place)) U(std::forward<Args>(args)...);
+  }
+};
+using Bytes = std::vector<std::byte, Uninitialised<std::byte>>;
 
-inline constexpr std::uint16_t protocol_version = 1;
+inline constexpr std::uint16_t protocol_version = 2;
 inline constexpr std::size_t header_size = 40; // [bytes]
 
 enum class FrameType : std::uint16_t {
@@ -51,10 +63,14 @@ struct FrameHeader {
   std::uint64_t checksum = 0; ///< of the payload
 };
 
-/// 64-bit checksum over 8-byte words. Each step is a bijection of the state for a given word and of
-/// the word for a given state, so that an error confined to one word is always found.
+/// 64-bit checksum over 8-byte words, in four chains that are joined at the end (word k goes to
+/// chain k mod 4: a processor works on all four at once). Each step is a bijection of the state for
+/// a given word and of the word for a given state, so that an error confined to one word is always
+/// found.
 std::uint64_t checksum(std::span<const std::byte> bytes);
 
+/// Fills the first header_size bytes of `frame` for the payload behind them.
+void write_header(FrameType type, std::uint64_t sequence, std::span<std::byte> frame);
 /// Header and payload in one block, ready to send.
 Bytes encode_frame(FrameType type, std::uint64_t sequence, std::span<const std::byte> payload);
 /// Throws MalformedMessage for a wrong magic number, checksum, version or type.
@@ -62,19 +78,27 @@ FrameHeader decode_header(std::span<const std::byte, header_size> bytes);
 /// Throws MalformedMessage when `payload` is not what `header` announced.
 void check_payload(const FrameHeader &header, std::span<const std::byte> payload);
 
-/// Appends values to a payload.
+/// Appends values to a payload. Room for the header stays in front of it, so that a frame is never
+/// copied as a whole.
 class PayloadWriter {
 public:
+  PayloadWriter() : frame_(header_size) {}
   PayloadWriter &number(std::uint64_t value);
   PayloadWriter &real(double value);
   PayloadWriter &text(std::string_view value);          ///< length, characters
   PayloadWriter &reals(std::span<const double> values); ///< count, values
   PayloadWriter &integers(std::span<const int> values); ///< count, values of 4 bytes
-  const Bytes &bytes() const { return bytes_; }
+  /// The payload.
+  std::span<const std::byte> bytes() const { return std::span(frame_).subspan(header_size); }
+  /// The whole frame, its header written.
+  std::span<const std::byte> frame(FrameType type, std::uint64_t sequence) {
+    write_header(type, sequence, frame_);
+    return frame_;
+  }
 
 private:
   void append(const void *data, std::size_t size);
-  Bytes bytes_;
+  Bytes frame_;
 };
 
 /// Reads them back in the same order; throws MalformedMessage where the bytes do not suffice. Never

@@ -5,6 +5,7 @@
 #include "bridge/side.hpp"
 #include "bridge/transport.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <utility>
@@ -17,7 +18,8 @@ public:
        std::unique_ptr<Transport> connected)
       : role(role_of(name)), case_text(config.canonical_text("bridge.token")),
         settings(config.read<BridgeSettings>("bridge")),
-        case_settings(config.read<CaseSettings>("case")), clock(case_settings),
+        case_settings(config.read<CaseSettings>("case")),
+        clock(case_settings, settings.max_halvings, settings.windows_to_grow),
         out_dir(std::move(folder)), transport(std::move(connected)) {
     std::filesystem::create_directories(out_dir);
     side = role == Role::fluid ? make_fluid_side(settings) : make_solid_side(settings, out_dir);
@@ -67,8 +69,12 @@ public:
     if (!clock.step(dt))
       return;
     clock.restart_window();
-    if (side->advance(exchange()) == Verdict::converged)
+    const Verdict verdict = side->advance(exchange());
+    failure.clear();
+    if (verdict == Verdict::converged)
       complete_window();
+    else if (verdict == Verdict::retry)
+      halve_window();
     else
       repeat_window();
   }
@@ -79,6 +85,7 @@ public:
     statistics.iterations_max = std::max<long>(statistics.iterations_max, iteration);
     is_complete = true;
     iteration = 1;
+    length_before = clock.window_length();
     clock.next_window();
     must_enter_window = !clock.is_over();
   }
@@ -88,12 +95,23 @@ public:
     if (std::exchange(must_enter_window, false))
       side->await_window(exchange());
   }
+  // Ends the run where windows are not tried again.
+  void fail_window(const std::string &reason) {
+    check(settings.max_halvings > 0, "{}", reason);
+    failure = reason.empty() ? "no reason was given" : reason;
+  }
+  void halve_window() {
+    clock.halve();
+    is_rejected = true;
+    iteration = 1;
+    must_enter_window = true;
+  }
   void repeat_window() {
     is_rejected = true;
     ++iteration;
   }
 
-  Exchange exchange() { return {*link, clock, statistics, iteration, totals}; }
+  Exchange exchange() { return {*link, clock, statistics, iteration, totals, failure}; }
 
   Role role;
   std::string case_text;
@@ -107,6 +125,8 @@ public:
   std::unique_ptr<Link> link;
   std::optional<WindowTotals> totals;
   mutable Statistics statistics;
+  std::string failure;      // why this side could not do the window
+  double length_before = 0; // [s] of the window before
   int iteration = 1;
   bool is_complete = false;
   bool is_rejected = false;
@@ -140,8 +160,9 @@ bool Participant::is_time_window_complete() const { return impl_->is_complete; }
 double Participant::max_time_step_size() const { return impl_->clock.left(); }
 
 bool Participant::requires_writing_checkpoint() const {
-  return impl_->settings.is_implicit() && impl_->iteration == 1 && impl_->clock.elapsed() == 0 &&
-         is_coupling_ongoing();
+  const BridgeSettings &settings = impl_->settings;
+  return (settings.is_implicit() || settings.max_halvings > 0) && impl_->iteration == 1 &&
+         impl_->clock.elapsed() == 0 && is_coupling_ongoing();
 }
 bool Participant::requires_reading_checkpoint() const { return impl_->is_rejected; }
 
@@ -164,15 +185,35 @@ void check_size(std::string_view field, std::size_t got, const InterfaceMesh &me
         mesh.positions.size(), mesh.n_nodes(), mesh.dim, got);
 }
 
-void check_finite(std::string_view field, std::span<const double> values, const InterfaceMesh &mesh,
-                  Role role, double time) {
+// What is wrong with the first value that is not finite; "" when all are.
+std::string not_finite(std::string_view field, std::span<const double> values,
+                       const InterfaceMesh &mesh, Role role, double time) {
+  const auto bad =
+      std::find_if_not(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
+  if (bad == values.end())
+    return "";
+  const auto node =
+      static_cast<std::size_t>(bad - values.begin()) / static_cast<std::size_t>(mesh.dim);
+  return fmt::format("bridge: the {}'s {} at t = {:.6g} s is not finite: {} at node {}, reference "
+                     "position ({:.6g}) m",
+                     name_of(role), field, time, *bad, node, fmt::join(mesh.position(node), ", "));
+}
+
+// At the part `s` of the window: linear, or on the parabola through the start of the window before,
+// `before` window lengths earlier (0: linear).
+void interpolate(const WindowField &window, double s, double before, std::span<double> values) {
+  if (s >= 1 || s <= 0) {
+    const std::vector<double> &known = s >= 1 ? window.end : window.start;
+    std::copy(known.begin(), known.end(), values.begin());
+    return;
+  }
   for (std::size_t k = 0; k < values.size(); ++k) {
-    if (std::isfinite(values[k]))
-      continue;
-    const auto node = k / static_cast<std::size_t>(mesh.dim);
-    fail("bridge: the {}'s {} at t = {:.6g} s is not finite: {} at node {}, reference position "
-         "({:.6g}) m",
-         name_of(role), field, time, values[k], node, fmt::join(mesh.position(node), ", "));
+    const double rise = window.end[k] - window.start[k];
+    values[k] = window.start[k] + s * rise;
+    if (before > 0) {
+      const double bend = (rise - (window.start[k] - window.before[k]) / before) / (1 + before);
+      values[k] += s * (s - 1) * bend;
+    }
   }
 }
 
@@ -182,8 +223,17 @@ void Participant::write_data(std::string_view field, std::span<const double> val
   impl_->told([&] {
     auto &written = field_of(impl_->side->writable, field, impl_->role, "writes");
     check_size(field, values.size(), impl_->mesh);
-    check_finite(field, values, impl_->mesh, impl_->role, time());
-    written.assign(values.begin(), values.end());
+    if (const auto bad = not_finite(field, values, impl_->mesh, impl_->role, time()); !bad.empty())
+      impl_->fail_window(bad);
+    else
+      written.assign(values.begin(), values.end());
+  });
+}
+
+void Participant::report_failure(std::string_view reason) {
+  impl_->told([&] {
+    check(impl_->link && !impl_->clock.is_over(), "bridge: report_failure outside the coupled run");
+    impl_->fail_window(std::string(reason));
   });
 }
 
@@ -200,8 +250,8 @@ void Participant::read_data(std::string_view field, double relative_time,
     check(s >= -1e-9 && s <= 1 + 1e-9,
           "bridge: {} read at {} s after t = {} s, outside the window of {} s", field,
           relative_time, time(), length);
-    for (std::size_t k = 0; k < values.size(); ++k)
-      values[k] = s >= 1 ? window.end[k] : window.start[k] + s * (window.end[k] - window.start[k]);
+    const bool is_parabola = impl_->settings.interpolation == "quadratic" && !window.before.empty();
+    interpolate(window, s, is_parabola ? impl_->length_before / length : 0, values);
   });
 }
 

@@ -9,8 +9,9 @@
 //   while (bridge.is_coupling_ongoing()) {
 //     if (bridge.requires_writing_checkpoint()) saved = state;
 //     const double dt = bridge.max_time_step_size();
-//     bridge.read_data("displacement", dt, displacement);  // at the end of the step: current
-//     iterate bridge.read_data("velocity", dt, velocity); step(state, dt);
+//     bridge.read_data("displacement", dt, displacement);  // the iterate at the end of the step
+//     bridge.read_data("velocity", dt, velocity);
+//     step(state, dt);
 //     bridge.write_data("force", nodal_forces);
 //     bridge.advance(dt);
 //     if (bridge.requires_reading_checkpoint()) state = saved;
@@ -22,8 +23,9 @@
 // "force", nodal forces [N] (2-D: per metre of depth), fluid -> solid, conservatively (H^T F).
 // All arrays hold dim components per node, node by node, in the order of the mesh of set_mesh.
 //
-// Scheme: serial, fluid first. Every failure (partner absent, dead, silent, with another case file;
-// data not finite; a window that does not converge) throws UserError and tells the partner.
+// Scheme: serial (fluid first) or parallel. Every failure (partner absent, dead, silent, with
+// another case file; data not finite; a window that does not converge) throws UserError and tells
+// the partner.
 #pragma once
 
 #include "bridge/base/config.hpp"
@@ -69,19 +71,27 @@ public:
   bool is_time_window_complete() const;
   /// What is left of the current window [s]; the whole window at its start.
   double max_time_step_size() const;
-  /// True at the first iteration of a window until the next advance; only in an implicit scheme.
+  /// True at the first iteration of a window until the next advance; only in an implicit scheme or
+  /// where windows may be halved.
   bool requires_writing_checkpoint() const;
-  /// True after an advance whose iteration did not converge: go back to the window's start.
+  /// True after an advance whose iteration did not converge, or whose window is tried again at half
+  /// its length (then iteration() is 1): go back to the window's start.
   bool requires_reading_checkpoint() const;
 
   /// Own field at the end of this step. Throws UserError for a wrong size, a field that this side
   /// does not write, or a value that is not finite (naming node and value).
   void write_data(std::string_view field, std::span<const double> values);
   /// The partner's field at `relative_time` [s] after the current time: in a window of length dt
-  /// 0 gives the value at its start, dt the current iterate at its end, linear in between. The
-  /// force at the start of the first window is the initial one (zero unless written). The solid's
-  /// first call in a window waits for the fluid's forces.
+  /// 0 gives the value at its start, dt the current iterate at its end, linear in between, or on
+  /// the parabola that also passes through the start of the window before (bridge.interpolation).
+  /// The force at the start of the first window is the initial one (zero unless written). The
+  /// solid's first call in a window waits for the fluid's forces.
   void read_data(std::string_view field, double relative_time, std::span<double> values) const;
+
+  /// This side cannot do the window (its solver did not converge, say), in place of write_data;
+  /// then advance(max_time_step_size()). Both sides go back to the window's start and try half of
+  /// it, up to bridge.max_halvings times; with none left, the run ends on both sides with `reason`.
+  void report_failure(std::string_view reason);
 
   /// Ends a step of length dt <= max_time_step_size() [s]. At the end of the window exchanges data
   /// with the partner and waits for it; before that (sub-steps) only moves the time on. A window

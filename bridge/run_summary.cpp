@@ -9,6 +9,7 @@ nlohmann::json summary_of(const Statistics &statistics) {
   const double steps = static_cast<double>(std::max(statistics.windows, 1L));
   nlohmann::json summary = {{"windows", statistics.windows},
                             {"failed_windows", statistics.failed_windows},
+                            {"halved_windows", statistics.halved_windows},
                             {"coupling_iterations_mean", statistics.iterations_mean()},
                             {"coupling_iterations_max", statistics.iterations_max},
                             {"ms_per_step_bridge", 1e3 * statistics.bridge_s / steps},
@@ -27,6 +28,8 @@ nlohmann::json summary_of(const MapReport &report) {
   return {{"map_coverage", report.coverage()},
           {"map_largest_distance_m", report.largest_distance},
           {"map_row_sum_error", report.row_sum_error},
+          {"map_largest_offset_m", report.largest_offset},
+          {"map_area_covered", report.area_covered},
           {"map_nodes_beyond", report.fluid_nodes_beyond}};
 }
 

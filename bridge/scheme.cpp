@@ -10,18 +10,6 @@ namespace {
 
 constexpr double relative_floor = 1e-12;
 
-// The vector that is accelerated: both parts in metres.
-Eigen::VectorXd stacked(const InterfaceState &state, double dt) {
-  Eigen::VectorXd x(state.displacement.size() + state.velocity.size());
-  x << state.displacement, dt * state.velocity;
-  return x;
-}
-
-InterfaceState unstacked(const Eigen::VectorXd &x, double dt) {
-  const Eigen::Index n = x.size() / 2;
-  return {x.head(n), x.tail(n) / dt};
-}
-
 double ratio(double part, double whole) {
   if (part == 0)
     return 0;
@@ -31,73 +19,143 @@ double ratio(double part, double whole) {
 } // namespace
 
 Scheme::Scheme(const BridgeSettings &settings, InterfaceState initial, double extent,
-               std::size_t n_nodes)
+               std::size_t n_nodes, Eigen::VectorXd initial_force)
     : settings_(settings), acceleration_(make_acceleration(settings)),
-      displacement_floor_(relative_floor * extent * std::sqrt(static_cast<double>(n_nodes))),
-      accepted_(std::move(initial)), iterate_(accepted_) {}
+      displacement_floor_((settings.displacement_floor + relative_floor * extent) *
+                          std::sqrt(static_cast<double>(n_nodes))),
+      accepted_(std::move(initial)), iterate_(accepted_), force_(std::move(initial_force)),
+      accepted_force_(force_) {}
 
 IterationRecord Scheme::advance(const InterfaceState &solved, const Eigen::VectorXd &force,
                                 double dt, double dt_next) {
   IterationRecord record = judge(solved, force);
   if (record.verdict == Verdict::converged && settings_.is_implicit())
-    finish_window(acceleration_, stacked(iterate_, dt), stacked(solved, dt),
-                  resolution(solved, dt));
+    finish_window(acceleration_, stacked(iterate_, force_, dt), stacked(solved, force, dt),
+                  resolution(solved, force, dt));
   if (record.verdict == Verdict::converged)
-    accept(solved, dt, dt_next);
+    accept(solved, force, dt, dt_next);
   if (record.verdict == Verdict::iterate)
-    iterate_again(solved, dt, record);
+    iterate_again(solved, force, dt, record);
   return record;
 }
 
 IterationRecord Scheme::judge(const InterfaceState &solved, const Eigen::VectorXd &force) {
+  if (!settings_.is_implicit())
+    return {Verdict::converged};
   const double gap = (solved.displacement - iterate_.displacement).norm();
   const double increment = (solved.displacement - accepted_.displacement).norm();
-  const double size = force.norm();
-  const double change = last_force_.size() > 0 ? (force - last_force_).norm()
-                                               : std::numeric_limits<double>::quiet_NaN();
-  largest_force_ = std::max(largest_force_, size);
-  last_force_ = force;
-  IterationRecord record{Verdict::iterate, ratio(gap, increment), ratio(change, size)};
-  const bool has_converged =
-      gap <= settings_.displacement_tolerance * increment + displacement_floor_ &&
-      change <= settings_.force_tolerance * size + relative_floor * largest_force_;
-  if (has_converged || !settings_.is_implicit())
+  const Eigen::VectorXd &before = settings_.is_parallel() ? force_ : last_force_;
+  const double change =
+      before.size() > 0 ? (force - before).norm() : std::numeric_limits<double>::quiet_NaN();
+  IterationRecord record{Verdict::iterate, ratio(gap, increment), ratio(change, force.norm())};
+  if (has_converged(solved, force, gap, change))
     record.verdict = Verdict::converged;
   else if (iteration_ >= settings_.max_iterations)
     record.verdict = Verdict::failed;
+  last_force_ = force;
   return record;
 }
 
-void Scheme::accept(const InterfaceState &solved, double dt, double dt_next) {
+bool Scheme::has_converged(const InterfaceState &solved, const Eigen::VectorXd &force, double gap,
+                           double change) {
+  if (iteration_ == 1)
+    first_gap_ = gap;
+  if (!(first_change_ > 0))
+    first_change_ = std::isnan(change) ? 0 : change;
+  largest_force_ = std::max(largest_force_, force.norm());
+  const double displacement_measure =
+      settings_.displacement_measure == "increment"
+          ? (solved.displacement - accepted_.displacement).norm()
+          : (settings_.displacement_measure == "value" ? solved.displacement.norm() : first_gap_);
+  const double force_measure = settings_.force_measure == "value" ? force.norm() : first_change_;
+  const bool is_near =
+      std::isfinite(gap) &&
+      gap <= settings_.displacement_tolerance * displacement_measure + displacement_floor_;
+  if (settings_.force_measure == "none")
+    return is_near;
+  return is_near && change <= settings_.force_tolerance * force_measure + settings_.force_floor +
+                                  relative_floor * largest_force_;
+}
+
+void Scheme::accept(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
+                    double dt_next) {
   velocity_before_ = accepted_.velocity;
+  dt_before_ = dt;
   accepted_ = solved;
-  iterate_ = settings_.is_implicit() ? prediction(dt, dt_next) : solved;
+  if (settings_.is_parallel())
+    accepted_force_ = force_ = force;
+  iterate_ = settings_.is_implicit() ? prediction(dt_next) : solved;
   last_force_.resize(0);
+  first_change_ = 0;
   iteration_ = 1;
 }
 
-// Differences ten times below what counts as converged are taken for noise of the solvers.
-double Scheme::resolution(const InterfaceState &solved, double dt) const {
-  return 0.1 * settings_.displacement_tolerance *
-         (stacked(solved, dt) - stacked(accepted_, dt)).norm();
+void Scheme::restart_window(double dt) {
+  forget_window(acceleration_);
+  if (settings_.is_implicit())
+    iterate_ = prediction(dt);
+  force_ = accepted_force_;
+  last_force_.resize(0);
+  first_change_ = 0;
+  iteration_ = 1;
 }
 
-InterfaceState Scheme::prediction(double dt, double dt_next) const {
-  const Eigen::VectorXd velocity =
-      accepted_.velocity + (accepted_.velocity - velocity_before_) * (dt_next / dt);
+InterfaceState Scheme::prediction(double dt_next) const {
+  if (settings_.predictor == "none" || accepted_.velocity.size() == 0)
+    return accepted_;
+  Eigen::VectorXd velocity = accepted_.velocity;
+  if (dt_before_ > 0)
+    velocity += (accepted_.velocity - velocity_before_) * (dt_next / dt_before_);
   return {accepted_.displacement + 0.5 * dt_next * (accepted_.velocity + velocity), velocity};
 }
 
-void Scheme::iterate_again(const InterfaceState &solved, double dt, IterationRecord &record) {
+// In metres throughout, so that no field drowns another.
+Eigen::VectorXd Scheme::stacked(const InterfaceState &state, const Eigen::VectorXd &force,
+                                double dt) const {
+  const Eigen::Index n_force = settings_.is_parallel() ? force.size() : 0;
+  Eigen::VectorXd x(state.displacement.size() + state.velocity.size() + n_force);
+  x << state.displacement, dt * state.velocity, force_scale_ * force.head(n_force);
+  return x;
+}
+
+// Once for the run: the history of the accelerator is in these units.
+void Scheme::find_force_scale(const InterfaceState &solved, const Eigen::VectorXd &force,
+                              double dt) {
+  if (!settings_.is_parallel() || force_scale_ > 0)
+    return;
+  const double motion = (solved.displacement - accepted_.displacement).norm() +
+                        dt * (solved.velocity - accepted_.velocity).norm();
+  const double change = (force - accepted_force_).norm();
+  if (!(motion > 0 && change > 0))
+    return;
+  force_scale_ = motion / change;
+  forget_window(acceleration_);
+}
+
+// Differences ten times below what counts as converged are taken for noise of the solvers.
+double Scheme::resolution(const InterfaceState &solved, const Eigen::VectorXd &force,
+                          double dt) const {
+  return 0.1 * settings_.displacement_tolerance *
+         (stacked(solved, force, dt) - stacked(accepted_, accepted_force_, dt)).norm();
+}
+
+void Scheme::iterate_again(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
+                           IterationRecord &record) {
+  find_force_scale(solved, force, dt);
   const AcceleratedIterate result =
-      accelerate(acceleration_, stacked(iterate_, dt), stacked(solved, dt), resolution(solved, dt));
+      accelerate(acceleration_, stacked(iterate_, force_, dt), stacked(solved, force, dt),
+                 resolution(solved, force, dt));
   record.relaxation = result.relaxation;
   record.columns = result.columns;
   if (!result.next.allFinite()) {
     record.verdict = Verdict::failed;
     return;
   }
-  iterate_ = unstacked(result.next, dt);
+  const Eigen::Index n = solved.displacement.size(), m = solved.velocity.size();
+  iterate_ = {result.next.head(n), result.next.segment(n, m) / dt};
+  if (settings_.is_parallel())
+    force_ =
+        force_scale_ > 0 ? Eigen::VectorXd(result.next.tail(force.size()) / force_scale_) : force;
   ++iteration_;
 }
 

@@ -1,15 +1,23 @@
 // SPDX-License-Identifier: MIT
-// The serial schemes, as the solid's side runs them: convergence, next iterate, predictor.
+// The schemes, as the solid's side runs them: convergence, next iterate, predictor.
 //
-// Implicit: the fluid computes forces F^k for the iterate (d^k, v^k), the solid answers (d~, v~).
-// The stacked vector [d ; dt v] is what the accelerator sees. A window is accepted when both hold:
-//   |d~ - d^k|      <= displacement_tolerance |d~ - d_n| + 1e-12 extent sqrt(nodes)
-//   |F^k - F^{k-1}| <= force_tolerance |F^k| + 1e-12 max |F| of the run   (from iteration 2 on)
-// The floors let a structure at rest, or one without load, converge. Accepted are d~ and v~.
-// The next window starts from v_p = v_n + (v_n - v_{n-1}) dt/dt_old (v_0 in the first window) and
-// d_p = d_n + dt (v_n + v_p)/2, which is consistent with v_p and exact for constant acceleration.
+// Serial, implicit: the fluid computes forces F^k for the iterate (d^k, v^k), the solid answers to
+// them (d~, v~). What is accelerated is x = [d ; dt v].
+// Parallel, implicit: both compute at the same time, the fluid F~ from (d^k, v^k), the solid (d~,
+// v~) from F^k. Accelerated is x = [d ; dt v ; c F], with c [m/N] the run's first ratio of
+// increments. A window is accepted when both hold (serial: F~ = F^k, F^k = F^{k-1}, from iteration
+// 2 on):
+//   |d~ - d^k| <= displacement_tolerance D + displacement_floor sqrt(nodes) + 1e-12 extent
+//   sqrt(nodes) |F~ - F^k| <= force_tolerance B + force_floor + 1e-12 max |F| of the run
+// with D = |d~ - d_n| (increment), |d~| (value) or the first |d~ - d^1| (residual), B = |F~|
+// (value) or the window's first |F~ - F^k| (residual; none: not asked). The last terms let a
+// structure at rest, or one without load, converge. Accepted are d~, v~ and F~. The next window
+// starts from v_p = v_n + (v_n - v_{n-1}) dt/dt_old (v_0 in the first window) and d_p = d_n + dt
+// (v_n + v_p)/2, which is consistent with v_p and exact for constant acceleration; or, with
+// predictor "none", from d_n and v_n. Forces start as they were.
 //
-// Explicit: one pass; the fluid sees the structure one window late, as it was solved.
+// Explicit: one pass; the fluid sees the structure one window late, as it was solved, and in the
+// parallel scheme the structure sees the forces one window late.
 #pragma once
 
 #include "bridge/acceleration.hpp"
@@ -19,10 +27,11 @@ namespace sluice::bridge {
 /// Motion of the solid's interface nodes, dim components per node.
 struct InterfaceState {
   Eigen::VectorXd displacement; ///< [m]
-  Eigen::VectorXd velocity;     ///< [m/s]
+  Eigen::VectorXd velocity;     ///< [m/s]; may be empty
 };
 
-enum class Verdict { iterate = 0, converged = 1, failed = 2 };
+/// `retry`: the window is given up and starts anew at half its length.
+enum class Verdict { iterate = 0, converged = 1, failed = 2, retry = 3 };
 
 /// One row of coupling.csv.
 struct IterationRecord {
@@ -36,34 +45,53 @@ struct IterationRecord {
 class Scheme {
 public:
   /// `extent` [m] and `n_nodes` scale the floor of the displacement criterion.
-  Scheme(const BridgeSettings &settings, InterfaceState initial, double extent,
-         std::size_t n_nodes);
+  Scheme(const BridgeSettings &settings, InterfaceState initial, double extent, std::size_t n_nodes,
+         Eigen::VectorXd initial_force = {});
 
-  /// Judges what the solid made of `force` in a window of length `dt` [s] and moves on: to the
-  /// window's next iterate, or to the first of the next window, of length `dt_next` [s].
+  /// Judges what the solid answered (serial: to `force`, parallel: while the fluid computed
+  /// `force`) in a window of length `dt` [s] and moves on: to the window's next iterate, or to the
+  /// first of the next window, of length `dt_next` [s].
   IterationRecord advance(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
                           double dt_next);
 
-  int iteration() const { return iteration_; }                  ///< of this window, from 1
-  const InterfaceState &accepted() const { return accepted_; }  ///< at the start of the window
-  const InterfaceState &iterate() const { return iterate_; }    ///< what the fluid computes with
+  /// The window starts anew with the length `dt` [s].
+  void restart_window(double dt);
+
+  int iteration() const { return iteration_; }                 ///< of this window, from 1
+  const InterfaceState &accepted() const { return accepted_; } ///< at the start of the window
+  const InterfaceState &iterate() const { return iterate_; }   ///< what the fluid computes with
+  const Eigen::VectorXd &force() const {
+    return force_;
+  } ///< parallel: what the solid computes with
   std::string explanation(const IterationRecord &record) const; ///< of a failure, with numbers
 
 private:
   IterationRecord judge(const InterfaceState &solved, const Eigen::VectorXd &force);
-  void accept(const InterfaceState &solved, double dt, double dt_next);
-  void iterate_again(const InterfaceState &solved, double dt, IterationRecord &record);
-  double resolution(const InterfaceState &solved, double dt) const;
-  InterfaceState prediction(double dt, double dt_next) const;
+  bool has_converged(const InterfaceState &solved, const Eigen::VectorXd &force, double gap,
+                     double change);
+  void accept(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
+              double dt_next);
+  void iterate_again(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
+                     IterationRecord &record);
+  void find_force_scale(const InterfaceState &solved, const Eigen::VectorXd &force, double dt);
+  Eigen::VectorXd stacked(const InterfaceState &state, const Eigen::VectorXd &force,
+                          double dt) const;
+  double resolution(const InterfaceState &solved, const Eigen::VectorXd &force, double dt) const;
+  InterfaceState prediction(double dt_next) const;
 
   BridgeSettings settings_;
   Acceleration acceleration_;
   double displacement_floor_; // [m], in the norm over all nodes
+  double force_scale_ = 0;    // c [m/N] of the parallel scheme; 0: not known yet
   double largest_force_ = 0;  // [N], norm over all nodes, of the run
+  double first_gap_ = 0;      // [m] of this window
+  double first_change_ = 0;   // [N] of this window
   int iteration_ = 1;
   InterfaceState accepted_, iterate_;
-  Eigen::VectorXd velocity_before_; // of the window before; empty in the first
-  Eigen::VectorXd last_force_;      // of the last iteration; empty in a window's first
+  Eigen::VectorXd force_, accepted_force_; // iterate and last accepted one; parallel only
+  Eigen::VectorXd velocity_before_;        // of the window before; empty in the first
+  double dt_before_ = 0;                   // [s] length of the window before
+  Eigen::VectorXd last_force_;             // of the last iteration; empty in a window's first
 };
 
 } // namespace sluice::bridge

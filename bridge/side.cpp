@@ -27,7 +27,7 @@ InterfaceMesh read_mesh(PayloadReader &read) {
 void send_mesh(Link &link, const InterfaceMesh &mesh) {
   PayloadWriter payload;
   write_mesh(payload, mesh);
-  link.send(FrameType::mesh, payload);
+  link.send(FrameType::mesh, std::move(payload));
 }
 
 InterfaceMesh receive_mesh(Link &link) {
@@ -64,6 +64,7 @@ void write_report(PayloadWriter &write, const MapReport &report) {
                            report.solid_nodes_reached, report.farthest_node})
     write.number(count);
   write.real(report.largest_distance).real(report.row_sum_error);
+  write.real(report.largest_offset).real(report.area_covered);
 }
 
 MapReport read_report(PayloadReader &read) {
@@ -73,6 +74,8 @@ MapReport read_report(PayloadReader &read) {
     *count = read.number();
   report.largest_distance = read.real();
   report.row_sum_error = read.real();
+  report.largest_offset = read.real();
+  report.area_covered = read.real();
   return report;
 }
 

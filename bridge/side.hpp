@@ -15,12 +15,16 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 
 namespace sluice::bridge {
 
-/// A field that is read: linear in time over the window.
+/// A field that is read inside a window.
 struct WindowField {
   std::vector<double> start, end; ///< at the start of the window; the current iterate at its end
+  std::vector<double> before;     ///< at the start of the window before; empty in the first
+  /// The window is accepted: the next one starts from `accepted`.
+  void move_on(std::vector<double> accepted) { before = std::exchange(start, std::move(accepted)); }
 };
 
 /// What both sides know of the run at an exchange.
@@ -30,6 +34,7 @@ struct Exchange {
   Statistics &statistics;
   int iteration;                             ///< of this window, from 1
   const std::optional<WindowTotals> &totals; ///< own report of the window before
+  const std::string &failure; ///< why this side could not do the window; "" if it did
 };
 
 class Side {
@@ -40,7 +45,7 @@ public:
   /// Called once after initialize, and in every later window before its data are read or it is
   /// advanced: the solid waits here for the fluid's forces.
   virtual void await_window(const Exchange &) {}
-  /// At the end of an iteration; throws UserError for a window that fails.
+  /// At the end of an iteration; throws UserError for a window that fails for good.
   virtual Verdict advance(const Exchange &exchange) = 0;
   virtual void finalize(const Exchange &exchange) = 0;
   virtual void add_totals(const WindowTotals &, Statistics &) {}
@@ -74,5 +79,6 @@ void write_report(PayloadWriter &write, const MapReport &report);
 MapReport read_report(PayloadReader &read);
 /// Upper bound [bytes] of a record with `n_values` numbers.
 std::size_t record_limit(std::size_t n_values);
+inline constexpr std::size_t longest_text = 1 << 16; ///< [bytes] of an explanation
 
 } // namespace sluice::bridge

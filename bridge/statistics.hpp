@@ -24,6 +24,7 @@ struct InterfaceTotals {
 struct Statistics {
   long windows = 0;        ///< accepted
   long failed_windows = 0; ///< not converged within max_iterations
+  long halved_windows = 0; ///< given up and tried again at half their length
   long iterations = 0;     ///< all accepted windows together
   long iterations_max = 0; ///< of one window
   double wait_s = 0;       ///< [s] blocked on the partner (its computing time included)

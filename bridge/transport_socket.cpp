@@ -2,6 +2,7 @@
 #include "bridge/transport_socket.hpp"
 
 #include "bridge/base/check.hpp"
+#include "bridge/transport_shared.hpp"
 
 #include <cerrno>
 #include <cstdlib>
@@ -53,6 +54,8 @@ std::string derived_path(const std::string &folder) {
 
 Address unix_address(const BridgeSettings &settings, const std::filesystem::path &out_dir) {
   Address address;
+  if (settings.transport == "shared")
+    address.family = Address::Family::shared_memory;
   address.path = settings.address.empty() ? derived_path(absolute_text(out_dir)) : settings.address;
   check(address.path.size() <= longest_path,
         "bridge.address '{}' has {} characters; a Unix-domain socket's path may have {}",
@@ -261,7 +264,7 @@ SocketHandle &SocketHandle::operator=(SocketHandle &&other) noexcept {
 Listener::Listener(const Address &address, const std::string &token)
     : socket_(address.family == Address::Family::tcp ? listen_tcp(address, token)
                                                      : listen_unix(address.path)),
-      path_(address.path) {
+      family_(address.family), path_(address.path) {
   check(::listen(socket_.get(), 4) == 0, "bridge.address {}: {}", address.text(),
         system_text(errno));
 }
@@ -271,6 +274,23 @@ Listener::~Listener() {
     ::unlink(path_.c_str());
 }
 
+namespace {
+
+// What the two speak over once they have met; nothing when the other end is gone already.
+std::unique_ptr<Transport> transport_over(SocketHandle socket, Address::Family family,
+                                          bool is_listener, Deadline deadline) {
+  if (family != Address::Family::shared_memory)
+    return std::make_unique<SocketTransport>(std::move(socket));
+  try {
+    return is_listener ? offer_shared_memory(std::move(socket))
+                       : accept_shared_memory(std::move(socket), deadline);
+  } catch (const ConnectionLost &) {
+    return nullptr;
+  }
+}
+
+} // namespace
+
 std::unique_ptr<Transport> Listener::accept(Deadline deadline) {
   while (wait_for(socket_.get(), POLLIN, deadline)) {
     SocketHandle peer(::accept4(socket_.get(), nullptr, nullptr, SOCK_CLOEXEC | SOCK_NONBLOCK));
@@ -278,7 +298,8 @@ std::unique_ptr<Transport> Listener::accept(Deadline deadline) {
       continue;
     if (path_.empty())
       send_at_once(peer.get());
-    return std::make_unique<SocketTransport>(std::move(peer));
+    if (auto transport = transport_over(std::move(peer), family_, true, deadline))
+      return transport;
   }
   return nullptr;
 }
@@ -305,24 +326,25 @@ int connect_error(int descriptor, const sockaddr *name, socklen_t size, Deadline
   return error;
 }
 
-std::unique_ptr<Transport> finished(SocketHandle socket, int error, const Address &address) {
+std::unique_ptr<Transport> finished(SocketHandle socket, int error, const Address &address,
+                                    Deadline deadline) {
   check(error == 0 || may_mend(error), "bridge.address {}: cannot connect: {}", address.text(),
         system_text(error));
   if (error != 0)
     return nullptr;
-  return std::make_unique<SocketTransport>(std::move(socket));
+  return transport_over(std::move(socket), address.family, false, deadline);
 }
 
 } // namespace
 
 std::unique_ptr<Transport> try_connect(const Address &address, Deadline deadline) {
-  if (address.family == Address::Family::unix_domain) {
+  if (address.family != Address::Family::tcp) {
     SocketHandle socket = open_socket(AF_UNIX);
     const auto name = unix_name(address.path);
     const int error = connect_error(socket.get(), generic(name), sizeof name, deadline);
     check(error != 0 || is_own_user(socket.get()),
           "bridge.address {}: another user's program listens there", address.path);
-    return finished(std::move(socket), error, address);
+    return finished(std::move(socket), error, address, deadline);
   }
   const auto list = resolve(address);
   int error = 0;
@@ -335,7 +357,7 @@ std::unique_ptr<Transport> try_connect(const Address &address, Deadline deadline
     if (error == 0)
       return std::make_unique<SocketTransport>(std::move(socket));
   }
-  return finished(SocketHandle(), error, address);
+  return finished(SocketHandle(), error, address, deadline);
 }
 
 } // namespace sluice::bridge

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Stream sockets: Unix-domain on one host, TCP otherwise. The fluid listens, the solid connects and
-// retries until its deadline, so that either program may start first. Every wait blocks in poll().
+// Stream sockets: Unix-domain on one host, TCP otherwise; with shared memory (transport_shared.hpp)
+// the Unix-domain socket is where the two meet. The fluid listens, the solid connects and retries
+// until its deadline, so that either program may start first. Every wait blocks in poll().
 #pragma once
 
 #include "bridge/settings.hpp"
@@ -14,9 +15,9 @@ namespace sluice::bridge {
 
 /// Where the two programs meet.
 struct Address {
-  enum class Family { unix_domain, tcp };
+  enum class Family { unix_domain, tcp, shared_memory };
   Family family = Family::unix_domain;
-  std::string path;       ///< Unix-domain only
+  std::string path;       ///< of the socket; not for TCP
   std::string host, port; ///< TCP only
   std::string text() const;
 };
@@ -56,6 +57,7 @@ public:
 
 private:
   SocketHandle socket_;
+  Address::Family family_;
   std::string path_; // to unlink
 };
 

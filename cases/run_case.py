@@ -77,6 +77,31 @@ def overrides_of(options):
     return overrides
 
 
+def case_file(options, folder):
+    """The case file and the overrides left for the solvers.
+
+    A case with a `prepare` script has settings of its own, in the table [parameters], from which
+    that script writes the case file.
+    """
+    prepare = CASES / options.case / "prepare"
+    if not prepare.is_file():
+        return CASES / options.case / "case.toml", overrides_of(options)
+    own = [text for text in options.overrides if text.strip().startswith("parameters.")]
+    file = folder.with_name(folder.name + ".toml")
+    file.parent.mkdir(parents=True, exist_ok=True)
+    command = [str(prepare), str(file)]
+    if options.spacing is not None:
+        command += ["--spacing", repr(options.spacing)]
+    for text in own:
+        command += ["--set", text]
+    status = subprocess.run(command).returncode
+    if status != 0:
+        sys.exit(EXIT_USAGE)
+    rest = [text for text in overrides_of(options)
+            if text not in own and not text.startswith("fluid.spacing_m=")]
+    return file, rest
+
+
 def output_folder(options):
     if options.out is not None:
         return options.out.absolute()
@@ -126,11 +151,18 @@ def build():
     print(f"built in {time.monotonic() - started:.0f} s")
 
 
+def set_options(overrides):
+    return [part for text in overrides for part in ("--set", text)]
+
+
 def run_solvers(options, folder):
-    command = [str(BUILD / "bridge/launcher/sluice"), "run",
-               str(CASES / options.case / "case.toml"), "--out", str(folder)]
-    for text in overrides_of(options):
-        command += ["--set", text]
+    """The launcher runs a coupled case; a case of one solver brings its own `solve`."""
+    file, overrides = case_file(options, folder)
+    own = CASES / options.case / "solve"
+    if own.is_file():
+        return call_through_signals([str(own), str(folder)] + set_options(overrides))
+    command = [str(BUILD / "bridge/launcher/sluice"), "run", str(file), "--out", str(folder)]
+    command += set_options(overrides)
     if options.threads is not None:
         command += ["--threads", str(options.threads)]
     return call_through_signals(command)

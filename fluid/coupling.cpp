@@ -183,14 +183,17 @@ public:
     bridge.initialize();
     open_history();
     const bool repeats_steps = bridge.settings().iterate == "full";
+    const bool may_halve = bridge.settings().max_halvings > 0;
     while (bridge.is_coupling_ongoing()) {
       const double dt = bridge.max_time_step_size();
       const bool is_first = bridge.iteration() == 1;
       const bool repeats_step = repeats_steps && bridge.iteration() <= most_full_iterations;
+      if (is_first && bridge.requires_reading_checkpoint()) // the same window, half as long
+        solver_.state = saved_;
       if (is_first) {
         surface.read_positions(bridge, 0, solver_.walls);
         moved_from_ = surface.displacement();
-        if (repeats_steps)
+        if (repeats_steps || may_halve)
           saved_ = solver_.state;
       } else if (repeats_step) {
         solver_.state = saved_;

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/diagnostics.hpp"
 
+#include "fluid/parallel.hpp"
+
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -11,17 +14,28 @@ template <int dim>
 Integrals<dim> integrate(const FluidState<dim> &state, const FluidParams<dim> &params) {
   const Points<dim> &points = state.points;
   const double volume = volume_of_point<dim>(params.spacing), mass = params.density * volume;
+  std::array<double, Blocks::max_count> fastest{};
+  const auto sums = block_sums<2 + dim>(points.size(), [&](IndexRange range) {
+    std::array<double, 2 + dim> part{};
+    double &speed2 = fastest[Blocks(points.size()).of(range.begin)];
+    for (int i = range.begin; i < range.end; ++i) {
+      const Vec<dim> &u = points.velocity[i];
+      const Vec<dim> x =
+          points.position[i] + 0.5 * state.step_size * (u - points.previous_velocity[i]);
+      part[0] += u.squaredNorm();
+      part[1] -= params.gravity.dot(x);
+      for (int d = 0; d < dim; ++d)
+        part[2 + d] += u[d];
+      speed2 = std::max(speed2, u.squaredNorm());
+    }
+    return part;
+  });
   Integrals<dim> total;
+  total.kinetic = 0.5 * mass * sums[0];
+  total.potential = mass * sums[1];
+  total.momentum = mass * Vec<dim>(&sums[2]);
   total.point_volume = points.size() * volume;
-  for (int i = 0; i < points.size(); ++i) {
-    const Vec<dim> &u = points.velocity[i];
-    const Vec<dim> x =
-        points.position[i] + 0.5 * state.step_size * (u - points.previous_velocity[i]);
-    total.kinetic += 0.5 * mass * u.squaredNorm();
-    total.potential -= mass * params.gravity.dot(x);
-    total.momentum += mass * u;
-    total.max_speed = std::max(total.max_speed, u.norm());
-  }
+  total.max_speed = std::sqrt(*std::max_element(fastest.begin(), fastest.end()));
   return total;
 }
 

@@ -39,8 +39,9 @@ template <int dim> Grid<dim> grid_over(const Points<dim> &points, double cell_si
   Vec<dim> low = Vec<dim>::Constant(1e300), high = -low;
   for (int i = 0; i < points.size(); ++i) {
     const Vec<dim> &x = points.position[i];
-    check(x.allFinite(), "point {} has no finite position: {} m; reduce the time step",
-          points.id[i], text_of(x));
+    if (!x.allFinite()) // no text is made of the others
+      fail("point {} has no finite position: {} m; reduce the time step", points.id[i],
+           text_of(x));
     low = low.cwiseMin(x);
     high = high.cwiseMax(x);
   }

@@ -31,7 +31,7 @@ template <int dim> struct FluidParams {
   std::string coupled_walls = "move";
   std::string start_state;
   int time_order = 1;
-  double pressure_tolerance = 1e-7;
+  double pressure_tolerance = 1e-6;
   double row_guard = 0.1;
   double gradient_guard = 20;
   double noise_damping = 0.5;

@@ -182,7 +182,7 @@ template <int dim> void FluidSolver<dim>::predict_velocity() {
     if (knows_pressure)
       for_each_point(points.size(),
                      [&](int i) { predicted_[i] += projection_dt_ * unbalanced(i); });
-    build_viscous_rows(points, cloud_, problem_, viscous_);
+    build_viscous_rows(points, cloud_, params_.rheology, problem_, viscous_);
     const ViscousResult result =
         diffuse_velocity(points, walls, cloud_, params_.rheology, params_.density, projection_dt_,
                          predicted_, viscous_);

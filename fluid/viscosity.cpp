@@ -66,11 +66,11 @@ std::array<Vec<3>, 2> tangents_of(const Vec<3> &n) {
 
 // --- stencils ---------------------------------------------------------------------------------
 
-/// Builds the rows of one point.
-template <int dim> class StencilBuilder {
-public:
-  enum class Kind { quadratic, linear, surface, pairs };
+enum class Kind { quadratic, linear, surface, pairs };
 
+/// Builds the rows of one point, with or without those of the gradient.
+template <int dim, bool with_gradient> class StencilBuilder {
+public:
   StencilBuilder(const Points<dim> &points, const Cloud<dim> &cloud,
                  const PressureProblem<dim> &pressure, ViscousProblem<dim> &problem)
       : points_(points), cloud_(cloud), pressure_(pressure), problem_(problem) {}
@@ -150,11 +150,14 @@ private:
   void pressures_row(const Row &row) const {
     const double *weights = &pressure_.matrix.value[pressure_.matrix.row_start[row.i] + 1];
     const double scale = -1 / (cloud_.spacing * cloud_.spacing);
-    const auto &functional = pressure_.gradient[row.i];
-    for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
-      const Vec<dim> q = scaled(row.i, points_.position[row.neighbours[k]]);
+    for (std::size_t k = 0; k < row.neighbours.size(); ++k)
       row.laplacian[k] = scale * weights[k];
-      row.gradient[k] = weight_at(q) * (functional.transpose() * quadratic_basis(q));
+    if constexpr (with_gradient) {
+      const auto &functional = pressure_.gradient[row.i];
+      for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
+        const Vec<dim> q = scaled(row.i, points_.position[row.neighbours[k]]);
+        row.gradient[k] = weight_at(q) * (functional.transpose() * quadratic_basis(q));
+      }
     }
   }
 
@@ -475,6 +478,8 @@ public:
       const double mean = 0.5 * (mu + problem_.viscosity[j]);
       if (is_open)
         visit(j, Mat<dim>(mean * problem_.block[start + k]));
+      else if (is_uniform_) // no gradients were made
+        visit(j, Mat<dim>(mean * problem_.laplacian[start + k] * Mat<dim>::Identity()));
       else
         visit(j, Mat<dim>(mean * problem_.laplacian[start + k] * Mat<dim>::Identity() +
                           outer(problem_.gradient[start + k], slope)));
@@ -691,21 +696,14 @@ template <int dim> double shear_rate(const Mat<dim> &gradient) {
   return (gradient + gradient.transpose()).norm() / std::sqrt(2.0);
 }
 
-template <int dim>
-void build_viscous_rows(const Points<dim> &points, const Cloud<dim> &cloud,
-                        const PressureProblem<dim> &pressure, ViscousProblem<dim> &problem) {
-  const int n = points.size();
-  problem.start.resize(n + 1);
-  problem.start[0] = 0;
-  for (int i = 0; i < n; ++i)
-    problem.start[i + 1] = problem.start[i] + cloud.neighbours.count[i];
-  problem.laplacian.resize(problem.start[n]);
-  problem.gradient.resize(problem.start[n]);
-  problem.block.resize(problem.start[n]);
-  problem.wall_weights.assign(cloud.point_walls.size(), {});
-  const StencilBuilder<dim> builder(points, cloud, pressure, problem);
+namespace {
+
+template <int dim, bool with_gradient>
+void build_rows(const Points<dim> &points, const Cloud<dim> &cloud,
+                const PressureProblem<dim> &pressure, ViscousProblem<dim> &problem) {
+  const StencilBuilder<dim, with_gradient> builder(points, cloud, pressure, problem);
   const auto counts = block_sums<4>(
-      n,
+      points.size(),
       [&](IndexRange range) {
         std::array<double, 4> count{};
         for (int i = range.begin; i < range.end; ++i)
@@ -715,6 +713,27 @@ void build_viscous_rows(const Points<dim> &points, const Cloud<dim> &cloud,
       Work::heavy);
   problem.rows = {static_cast<int>(counts[0]), static_cast<int>(counts[1]),
                   static_cast<int>(counts[2]), static_cast<int>(counts[3])};
+}
+
+} // namespace
+
+template <int dim>
+void build_viscous_rows(const Points<dim> &points, const Cloud<dim> &cloud,
+                        const Rheology &rheology, const PressureProblem<dim> &pressure,
+                        ViscousProblem<dim> &problem) {
+  const int n = points.size();
+  problem.start.resize(n + 1);
+  problem.start[0] = 0;
+  for (int i = 0; i < n; ++i)
+    problem.start[i + 1] = problem.start[i] + cloud.neighbours.count[i];
+  problem.laplacian.resize(problem.start[n]);
+  problem.gradient.resize(problem.start[n]);
+  problem.block.resize(problem.start[n]);
+  problem.wall_weights.assign(cloud.point_walls.size(), {});
+  if (rheology.is_newtonian())
+    build_rows<dim, false>(points, cloud, pressure, problem);
+  else
+    build_rows<dim, true>(points, cloud, pressure, problem);
 }
 
 template <int dim>
@@ -772,14 +791,14 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
 }
 
 template double shear_rate(const Mat<2> &);
-template void build_viscous_rows(const Points<2> &, const Cloud<2> &, const PressureProblem<2> &,
-                                 ViscousProblem<2> &);
+template void build_viscous_rows(const Points<2> &, const Cloud<2> &, const Rheology &,
+                                 const PressureProblem<2> &, ViscousProblem<2> &);
 template ViscousResult diffuse_velocity(const Points<2> &, const Walls<2> &, const Cloud<2> &,
                                         const Rheology &, double, double, VecSpan<2>,
                                         ViscousProblem<2> &);
 template double shear_rate(const Mat<3> &);
-template void build_viscous_rows(const Points<3> &, const Cloud<3> &, const PressureProblem<3> &,
-                                 ViscousProblem<3> &);
+template void build_viscous_rows(const Points<3> &, const Cloud<3> &, const Rheology &,
+                                 const PressureProblem<3> &, ViscousProblem<3> &);
 template ViscousResult diffuse_velocity(const Points<3> &, const Walls<3> &, const Cloud<3> &,
                                         const Rheology &, double, double, VecSpan<3>,
                                         ViscousProblem<3> &);

@@ -62,10 +62,12 @@ template <int dim> struct ViscousProblem {
 };
 
 /// Stencils of a frozen cloud; once per step. Away from walls and surfaces they are those of the
-/// pressure, whose operators must be assembled.
+/// pressure, whose operators must be assembled. A Newtonian fluid gets no gradients there: its law
+/// does not look at them.
 template <int dim>
 void build_viscous_rows(const Points<dim> &points, const Cloud<dim> &cloud,
-                        const PressureProblem<dim> &pressure, ViscousProblem<dim> &problem);
+                        const Rheology &rheology, const PressureProblem<dim> &pressure,
+                        ViscousProblem<dim> &problem);
 
 struct ViscousResult {
   int iterations = 0; // of the linear solver

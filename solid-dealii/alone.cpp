@@ -5,6 +5,7 @@
 #include "bridge/settings.hpp"
 #include "bridge/window_clock.hpp"
 #include "solid-dealii/history.hpp"
+#include "solid-dealii/state_file.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -20,6 +21,14 @@ Side wet_side(Side clamped) {
 
 template <int dim>
 void print_tip(const char *what, const SolidSolver<dim> &s, const SolidState &x) {
+  for (const auto &probe : s.params().probes) {
+    const int node =
+        s.discretisation().nearest_node(Eigen::Map<const Vec<dim>>(probe.position.data()));
+    const Vec<dim> u = x.displacement.template segment<dim>(dim * node);
+    fmt::print("{}: {} ux {:.5f} mm, uy {:.5f} mm\n", what, probe.name, 1e3 * u.x(), 1e3 * u.y());
+  }
+  if (!s.params().mesh.empty())
+    return;
   const auto end = free_end(s.discretisation(), s.clamped_side());
   const Vec<dim> middle = end.middle(x.displacement), front = end.at(x.displacement, end.front),
                  back = end.at(x.displacement, end.back);
@@ -29,15 +38,32 @@ void print_tip(const char *what, const SolidSolver<dim> &s, const SolidState &x)
 }
 
 template <int dim> double tip_x(const SolidSolver<dim> &s, const SolidState &x) {
-  return free_end(s.discretisation(), s.clamped_side()).middle(x.displacement).x();
+  return s.params().mesh.empty()
+             ? free_end(s.discretisation(), s.clamped_side()).middle(x.displacement).x()
+             : x.displacement.cwiseAbs().maxCoeff();
+}
+
+template <int dim> bool has_own_load(const SolidSolver<dim> &s) {
+  return s.own_load().cwiseAbs().maxCoeff() > 0;
 }
 
 template <int dim> Eigen::VectorXd dead_load(const SolidSolver<dim> &s, const Hydrostatic &water) {
+  if (has_own_load(s))
+    return Eigen::VectorXd::Zero(s.discretisation().n_dofs());
   return pressure_forces(s.discretisation(), wet_side(s.clamped_side()), water,
                          s.initial_state().displacement);
 }
 
-template <int dim> void run_static(SolidSolver<dim> &s, const Hydrostatic &water) {
+template <int dim>
+void run_static(SolidSolver<dim> &s, const Hydrostatic &water, const std::filesystem::path &folder,
+                double output_interval) {
+  if (has_own_load(s)) {
+    const SolidState state = s.solve_static(dead_load(s, water));
+    print_tip("own load", s, state);
+    std::filesystem::create_directories(folder);
+    History<dim> history(s, folder, output_interval, &state);
+    return history.write_summary("", nlohmann::json::object());
+  }
   print_tip("follower pressure", s, s.solve_static_follower(wet_side(s.clamped_side()), water));
   print_tip("dead pressure", s, s.solve_static(dead_load(s, water)));
 }
@@ -49,26 +75,35 @@ template <int dim> void run_modes(SolidSolver<dim> &s) {
 
 template <int dim>
 void run_release(SolidSolver<dim> &s, const Hydrostatic &water,
-                 const bridge::CaseSettings &settings, const std::filesystem::path &folder) {
+                 const bridge::CaseSettings &settings, const std::filesystem::path &folder,
+                 const std::filesystem::path &restart) {
   std::filesystem::create_directories(folder);
-  History<dim> history(s, folder, settings.output_interval);
-  Progress progress("solid", settings.end_time);
   const Eigen::VectorXd load = dead_load(s, water);
+  bridge::WindowClock clock(settings);
   SolidState state = s.initial_state();
-  state.acceleration = s.consistent_acceleration(state, load);
+  if (restart.empty())
+    state.acceleration = s.consistent_acceleration(state, load);
+  else {
+    const SavedState saved = read_state(restart, state);
+    state = saved.state;
+    while (!clock.is_over() && clock.time() < saved.time - 1e-9 * settings.time_step)
+      clock.next_window();
+  }
+  History<dim> history(s, folder, settings.output_interval, &state, clock.time());
+  Progress progress("solid", settings.end_time);
   double highest = 0;
-  for (bridge::WindowClock clock(settings); !clock.is_over();) {
+  while (!clock.is_over()) {
     const SolidState start = state;
-    state = s.step(start, load, clock.window_length());
+    state = s.advance(start, load, clock.window_length());
     clock.next_window();
     history.record(start, state, load, clock.time());
     progress.update(clock.time(), history.note());
     highest = std::max(highest, tip_x(s, state));
   }
   history.write_summary("", nlohmann::json::object());
-  const double n = static_cast<double>(settings.n_windows());
+  const double n = std::max(1.0, static_cast<double>(s.counts().solves));
   print_tip("at the end", s, state);
-  fmt::print("largest tip ux {:.4f} mm; {:.0f} steps of {:.3f} ms, {:.3f} ms CPU, {:.2f} Newton "
+  fmt::print("largest ux {:.4f} mm; {:.0f} steps of {:.3f} ms, {:.3f} ms CPU, {:.2f} Newton "
              "iterations\n",
              1e3 * highest, n, 1e3 * s.counts().seconds / n, 1e3 * s.counts().cpu_seconds / n,
              static_cast<double>(s.counts().iterations) / n);
@@ -76,27 +111,33 @@ void run_release(SolidSolver<dim> &s, const Hydrostatic &water,
 
 template <int dim>
 void run_task(const std::string &task, const SolidParams &params, const Config &config,
-              const Hydrostatic &water, const std::filesystem::path &folder) {
+              const Hydrostatic &water, const std::filesystem::path &folder,
+              const std::filesystem::path &restart) {
   SolidSolver<dim> solver(params);
+  const auto settings = config.read<bridge::CaseSettings>("case");
+  check(task == "modes" || has_own_load(solver) || params.mesh.empty(),
+        "{}: [solid] has a mesh, but neither gravity_m_s2 nor a boundary with traction_pa: nothing "
+        "loads it without a partner",
+        config.file_name());
   if (task == "static")
-    run_static(solver, water);
+    run_static(solver, water, folder, settings.output_interval);
   else if (task == "modes")
     run_modes(solver);
   else
-    run_release(solver, water, config.read<bridge::CaseSettings>("case"), folder);
+    run_release(solver, water, settings, folder, restart);
 }
 
 } // namespace
 
 void run_alone(const std::string &task, const Config &config, const Hydrostatic &water,
-               const std::filesystem::path &folder) {
+               const std::filesystem::path &folder, const std::filesystem::path &restart) {
   check(task == "static" || task == "modes" || task == "release",
         "--alone {}: unknown task; give static, modes or release", task);
-  const auto params = config.read<SolidParams>("solid");
+  const auto params = read_params(config);
   if (params.dimension == 2)
-    run_task<2>(task, params, config, water, folder);
+    run_task<2>(task, params, config, water, folder, restart);
   else
-    run_task<3>(task, params, config, water, folder);
+    run_task<3>(task, params, config, water, folder, restart);
 }
 
 } // namespace sluice::solid

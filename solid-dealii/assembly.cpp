@@ -1,45 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "solid-dealii/assembly.hpp"
 
+#include "solid-dealii/cell_system.hpp"
+
+#include <algorithm>
 #include <cmath>
 
 namespace sluice::solid {
 namespace {
-
-// Displacement of a cell's nodes and modes, column by column.
-template <int dim, int nodes, int modes>
-Columns<dim, nodes + modes> gather(const Discretisation<dim> &d, int cell,
-                                   const Eigen::VectorXd &displacement,
-                                   const Eigen::VectorXd &mode_values) {
-  Columns<dim, nodes + modes> u;
-  const int *numbers = d.cell_nodes.data() + cell * nodes;
-  for (int a = 0; a < nodes; ++a)
-    u.col(a) = displacement.template segment<dim>(dim * numbers[a]);
-  for (int a = 0; a < modes; ++a)
-    u.col(nodes + a) = mode_values.template segment<dim>(dim * (cell * modes + a));
-  return u;
-}
-
-template <int dim, int columns>
-Eigen::Map<const Columns<dim, columns>> gradient_at(const Discretisation<dim> &d, int cell, int q) {
-  const auto index = static_cast<std::size_t>(cell * d.points_per_cell + q);
-  return Eigen::Map<const Columns<dim, columns>>(d.gradients.data() + index * dim * columns);
-}
-
-template <int dim> double weight_at(const Discretisation<dim> &d, int cell, int q) {
-  return d.weights[static_cast<std::size_t>(cell * d.points_per_cell + q)];
-}
-
-template <int dim, int columns, class Law>
-ElementSystem<dim, columns> element_system(const Discretisation<dim> &d, const Law &law, int cell,
-                                           const Columns<dim, columns> &u, bool with_tangent) {
-  ElementSystem<dim, columns> element;
-  for (int q = 0; q < d.points_per_cell; ++q)
-    if (!add_point<dim, columns>(law, u, gradient_at<dim, columns>(d, cell, q),
-                                 weight_at(d, cell, q), with_tangent, element))
-      break;
-  return element;
-}
 
 // Calls action(cell, q, F) at every point of the body.
 template <int dim, class Action>
@@ -56,25 +24,16 @@ void for_each_point(const Discretisation<dim> &d, const Eigen::VectorXd &displac
   });
 }
 
-// Cauchy stress with its out-of-plane part: in plane strain b33 = 1 and E33 = 0.
-template <int dim> Mat<3> cauchy_stress(const Material &material, const Mat<dim> &F) {
-  return std::visit(
-      [&](const auto &law) {
-        Mat<3> whole = Mat<3>::Identity();
-        whole.template topLeftCorner<dim, dim>() = F;
-        const double det_f = F.determinant();
-        const Mat<3> stress = law.template response<3>(whole, det_f).stress;
-        return Mat<3>(stress / det_f);
-      },
-      material);
-}
-
 } // namespace
 
 template <int dim>
 Assembly<dim>::Assembly(const Discretisation<dim> &discretisation, Material material,
                         double density, const std::vector<bool> &fixed)
-    : discretisation_(discretisation), material_(material) {
+    : discretisation_(discretisation), material_(std::move(material)) {
+  check(discretisation.kind != ElementKind::q2_p1 ||
+            (material_.volume() && material_.plane == Plane::strain),
+        "solid: the element q2-p1 needs a law with a volume energy of its own (neo-hookean-split, "
+        "mooney-rivlin, yeoh or ogden) in plane strain or space; take another element or law");
   check(density > 0, "solid: density is {} kg/m^3; it must be positive", density);
   check(static_cast<int>(fixed.size()) == discretisation.n_dofs(),
         "solid: {} support conditions for {} displacement components", fixed.size(),
@@ -106,15 +65,35 @@ template <int dim> void Assembly<dim>::build_pattern() {
     const auto node = d.cell_nodes[static_cast<std::size_t>(cell * d.nodes_per_cell + k / dim)];
     return unknown_of_[static_cast<std::size_t>(dim * node + k % dim)];
   };
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int cell = 0; cell < d.n_cells(); ++cell)
-    for (int i = 0; i < size; ++i)
-      for (int j = 0; j < size; ++j)
-        if (unknown(cell, i) >= 0 && unknown(cell, j) >= 0)
-          entries.emplace_back(unknown(cell, i), unknown(cell, j), 0.0);
-  tangent_.resize(n_free_, n_free_);
-  tangent_.setFromTriplets(entries.begin(), entries.end());
-  tangent_.makeCompressed();
+  // Column by column from the nodes that share a cell: a list of all element entries would take
+  // more memory than the matrix.
+  std::vector<std::vector<int>> neighbours(static_cast<std::size_t>(d.n_nodes()));
+  for (int cell = 0; cell < d.n_cells(); ++cell) {
+    const int *nodes = d.cell_nodes.data() + cell * d.nodes_per_cell;
+    for (int a = 0; a < d.nodes_per_cell; ++a) {
+      auto &of_node = neighbours[static_cast<std::size_t>(nodes[a])];
+      of_node.insert(of_node.end(), nodes, nodes + d.nodes_per_cell);
+    }
+  }
+  std::vector<int> starts{0}, rows;
+  for (int a = 0; a < d.n_nodes(); ++a) {
+    auto &of_node = neighbours[static_cast<std::size_t>(a)];
+    std::sort(of_node.begin(), of_node.end());
+    of_node.erase(std::unique(of_node.begin(), of_node.end()), of_node.end());
+    for (int c = 0; c < dim; ++c) {
+      if (unknown_of_[static_cast<std::size_t>(dim * a + c)] < 0)
+        continue;
+      for (const int b : of_node)
+        for (int e = 0; e < dim; ++e)
+          if (const int row = unknown_of_[static_cast<std::size_t>(dim * b + e)]; row >= 0)
+            rows.push_back(row);
+      starts.push_back(static_cast<int>(rows.size()));
+    }
+    std::vector<int>().swap(of_node);
+  }
+  std::vector<double> zeros(rows.size(), 0.0);
+  tangent_ = Eigen::Map<SparseMatrix>(n_free_, n_free_, static_cast<Eigen::Index>(rows.size()),
+                                      starts.data(), rows.data(), zeros.data());
   mass_ = tangent_;
 
   const auto place = [&](int row, int column) {
@@ -179,6 +158,39 @@ template <int dim> Eigen::VectorXd Assembly<dim>::mass_times(const Eigen::Vector
   return product;
 }
 
+template <int dim> RigidMotions Assembly<dim>::rigid_motions() const {
+  const auto &d = discretisation_;
+  Vec<dim> centre = Vec<dim>::Zero();
+  for (const Vec<dim> &x : d.nodes)
+    centre += x / d.n_nodes();
+  const auto unknown = [&](int node, int c) {
+    return unknown_of_[static_cast<std::size_t>(dim * node + c)];
+  };
+  RigidMotions motions{dim, std::vector<int>(static_cast<std::size_t>(n_free_)),
+                       Eigen::MatrixXd::Zero(d.n_dofs(), voigt_size<dim>)};
+  int places = 0;
+  for (int a = 0; a < d.n_nodes(); ++a) {
+    const Vec<dim> x = d.nodes[static_cast<std::size_t>(a)] - centre;
+    bool is_free = false;
+    for (int c = 0; c < dim; ++c) {
+      if (unknown(a, c) < 0)
+        continue;
+      is_free = true;
+      motions.place[static_cast<std::size_t>(unknown(a, c))] = places + c;
+      for (int k = 0; k < voigt_size<dim>; ++k) { // translations, then rotations in every plane
+        const int i = voigt_row<dim>(k), j = voigt_column<dim>(k);
+        motions.vectors(places + c, k) = k < dim  ? (c == i ? 1 : 0)
+                                         : c == i ? -x[j]
+                                         : c == j ? x[i]
+                                                  : 0;
+      }
+    }
+    places += is_free ? dim : 0;
+  }
+  motions.vectors.conservativeResize(places, Eigen::NoChange);
+  return motions;
+}
+
 template <int dim> void Assembly<dim>::clear() {
   std::fill_n(tangent_.valuePtr(), tangent_.nonZeros(), 0.0);
   condensed_force_.setZero();
@@ -186,26 +198,25 @@ template <int dim> void Assembly<dim>::clear() {
 }
 
 template <int dim>
-double Assembly<dim>::linearise(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes) {
+double Assembly<dim>::linearise(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes,
+                                const Overstress<dim> &overstress) {
   clear();
   double min_det = 0;
   with_element<dim>(discretisation_.kind, [&]<int nodes, int n_modes>() {
-    min_det =
-        std::visit([&](const auto &law) { return sweep<nodes, n_modes>(law, displacement, modes); },
-                   material_);
+    min_det = sweep<nodes, n_modes>(displacement, modes, overstress);
   });
   return min_det;
 }
 
 template <int dim>
-template <int nodes, int modes, class Law>
-double Assembly<dim>::sweep(const Law &law, const Eigen::VectorXd &displacement,
-                            const Eigen::VectorXd &mode_values) {
-  constexpr int columns = nodes + modes;
+template <int nodes, int modes>
+double Assembly<dim>::sweep(const Eigen::VectorXd &displacement, const Eigen::VectorXd &mode_values,
+                            const Overstress<dim> &overstress) {
   double min_det = std::numeric_limits<double>::infinity(), modes_squared = 0, stiffest = 0;
-  for (int cell = 0; cell < discretisation_.n_cells(); ++cell) {
-    const auto u = gather<dim, nodes, modes>(discretisation_, cell, displacement, mode_values);
-    auto element = element_system<dim, columns>(discretisation_, law, cell, u, true);
+  for (int k = 0; k < discretisation_.n_cells(); ++k) {
+    const auto u = gather<dim, nodes, modes>(discretisation_, k, displacement, mode_values);
+    auto element =
+        cell_system<dim, nodes, modes>(discretisation_, material_, overstress, k, u, true);
     min_det = std::min(min_det, element.min_det);
     if (!(min_det > 0))
       return min_det;
@@ -213,7 +224,7 @@ double Assembly<dim>::sweep(const Law &law, const Eigen::VectorXd &displacement,
     modes_squared += element.force.template rightCols<modes>().squaredNorm();
     stiffest =
         std::max(stiffest, element.tangent.diagonal().template head<dim * nodes>().maxCoeff());
-    scatter<nodes, modes>(cell, condense<dim, nodes, modes>(element));
+    scatter<nodes, modes>(k, condense<dim, nodes, modes>(element));
   }
   mode_residual_ = std::sqrt(modes_squared);
   stiffest_ = stiffest;
@@ -268,24 +279,33 @@ Eigen::VectorXd Assembly<dim>::mode_increment(const Eigen::VectorXd &increment) 
 
 template <int dim>
 Eigen::VectorXd Assembly<dim>::internal_force(const Eigen::VectorXd &displacement,
-                                              const Eigen::VectorXd &mode_values) const {
+                                              const Eigen::VectorXd &mode_values,
+                                              const Overstress<dim> &overstress) const {
   const auto &d = discretisation_;
   Eigen::VectorXd force = Eigen::VectorXd::Zero(d.n_dofs());
   with_element<dim>(d.kind, [&]<int nodes, int modes>() {
-    std::visit(
-        [&](const auto &law) {
-          for (int cell = 0; cell < d.n_cells(); ++cell) {
-            const auto u = gather<dim, nodes, modes>(d, cell, displacement, mode_values);
-            const auto element = element_system<dim, nodes + modes>(d, law, cell, u, false);
-            for (int a = 0; a < nodes; ++a)
-              force.template segment<dim>(
-                  dim * d.cell_nodes[static_cast<std::size_t>(cell * nodes + a)]) +=
-                  element.force.col(a);
-          }
-        },
-        material_);
+    for (int k = 0; k < d.n_cells(); ++k) {
+      const auto u = gather<dim, nodes, modes>(d, k, displacement, mode_values);
+      const auto element = cell_system<dim, nodes, modes>(d, material_, overstress, k, u, false);
+      for (int a = 0; a < nodes; ++a)
+        force.template segment<dim>(dim * d.cell_nodes[static_cast<std::size_t>(k * nodes + a)]) +=
+            element.force.col(a);
+    }
   });
   return force;
+}
+
+template <int dim>
+Eigen::VectorXd Assembly<dim>::relaxing_stresses(const Eigen::VectorXd &displacement,
+                                                 const Eigen::VectorXd &modes) const {
+  constexpr int n = voigt_size<dim>;
+  const auto &d = discretisation_;
+  Eigen::VectorXd stresses(n * static_cast<Eigen::Index>(d.weights.size()));
+  for_each_point(d, displacement, modes, [&](int k, int q, const Mat<dim> &F) {
+    stresses.template segment<n>(n * (k * d.points_per_cell + q)) =
+        relaxing_stress<dim>(material_, F);
+  });
+  return stresses;
 }
 
 template <int dim>
@@ -300,14 +320,42 @@ double Assembly<dim>::smallest_det(const Eigen::VectorXd &displacement,
 }
 
 template <int dim>
+Eigen::VectorXd Assembly<dim>::energy_of_cells(const Eigen::VectorXd &displacement,
+                                               const Eigen::VectorXd &modes) const {
+  const auto &d = discretisation_;
+  Eigen::VectorXd energy = Eigen::VectorXd::Zero(d.n_cells());
+  for_each_point(d, displacement, modes, [&](int k, int q, const Mat<dim> &F) {
+    energy[k] += weight_at(d, k, q) * strain_energy_density<dim>(material_, F);
+  });
+  if (d.kind == ElementKind::q2_p1) // there the volume changes by theta, not by J
+    for_each_volume_field(displacement, [&](int k, const auto &det, const auto &field) {
+      const Volume &volume = *material_.volume();
+      for (int q = 0; q < d.points_per_cell; ++q)
+        energy[k] += weight_at(d, k, q) * (volume.energy(field.theta[q]) - volume.energy(det[q]));
+    });
+  return energy;
+}
+
+template <int dim>
 double Assembly<dim>::strain_energy(const Eigen::VectorXd &displacement,
                                     const Eigen::VectorXd &modes) const {
-  double energy = 0;
-  for_each_point(discretisation_, displacement, modes, [&](int cell, int q, const Mat<dim> &F) {
-    energy += weight_at(discretisation_, cell, q) *
-              std::visit([&](const auto &law) { return law.template energy<dim>(F); }, material_);
-  });
-  return energy;
+  return energy_of_cells(displacement, modes).sum();
+}
+
+// Calls action(cell, det F, VolumeField) for every cell of a mixed element.
+template <int dim>
+template <class Action>
+void Assembly<dim>::for_each_volume_field(const Eigen::VectorXd &displacement,
+                                          Action &&action) const {
+  const auto &d = discretisation_;
+  constexpr int nodes = dim == 2 ? 9 : 27;
+  for (int k = 0; k < d.n_cells(); ++k) {
+    const auto u = gather<dim, nodes, 0>(d, k, displacement, displacement);
+    const auto at = deformation<dim, nodes>(d, k, u);
+    action(k, at.det,
+           volume_field<dim>(pressure_basis(d, k), at.det, decltype(at.det)(cell_weights(d, k)),
+                             *material_.volume()));
+  }
 }
 
 template <int dim>
@@ -316,13 +364,17 @@ Eigen::MatrixXd Assembly<dim>::mean_stress(const Eigen::VectorXd &displacement,
   const auto &d = discretisation_;
   Eigen::MatrixXd mean = Eigen::MatrixXd::Zero(6, d.n_cells());
   Eigen::VectorXd volume = Eigen::VectorXd::Zero(d.n_cells());
-  for_each_point(d, displacement, modes, [&](int cell, int q, const Mat<dim> &F) {
-    const Mat<3> s = cauchy_stress<dim>(material_, F);
-    const double w = weight_at(d, cell, q);
-    mean.col(cell) +=
-        w * (Eigen::VectorXd(6) << s(0, 0), s(1, 1), s(2, 2), s(0, 1), s(0, 2), s(1, 2)).finished();
-    volume[cell] += w;
+  for_each_point(d, displacement, modes, [&](int k, int q, const Mat<dim> &F) {
+    const double w = weight_at(d, k, q);
+    mean.col(k) += w * to_voigt<3>(cauchy_stress<dim>(material_, F));
+    volume[k] += w;
   });
+  if (d.kind == ElementKind::q2_p1) // there the pressure is a field of its own
+    for_each_volume_field(displacement, [&](int k, const auto &det, const auto &field) {
+      for (int q = 0; q < d.points_per_cell; ++q)
+        mean.col(k).template head<3>().array() +=
+            weight_at(d, k, q) * (field.pressure[q] - material_.volume()->pressure(det[q]));
+    });
   return mean.array().rowwise() / volume.transpose().array();
 }
 

@@ -7,6 +7,7 @@
 #pragma once
 
 #include "solid-dealii/discretisation.hpp"
+#include "solid-dealii/linear_solver.hpp"
 
 #include <Eigen/Sparse>
 
@@ -27,6 +28,9 @@ public:
   Eigen::VectorXd restrict_to_free(const Eigen::VectorXd &all) const;
   void add_to_free(Eigen::VectorXd &all, double factor, const Eigen::VectorXd &free) const;
 
+  /// Translations and small rotations of the whole body.
+  RigidMotions rigid_motions() const;
+
   /// Consistent mass [kg] of the free unknowns; same sparsity as the tangent.
   const SparseMatrix &mass() const { return mass_; }
   /// Consistent mass applied to a vector over all components, fixed ones included.
@@ -34,7 +38,8 @@ public:
 
   /// Linearises the internal force at (displacement, modes). Returns the smallest det F; when that
   /// is not positive the sweep stops and the results below are not valid.
-  double linearise(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes);
+  double linearise(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes,
+                   const Overstress<dim> &overstress = {});
   const SparseMatrix &tangent() const { return tangent_; } ///< [N/m], modes condensed
   const Eigen::VectorXd &condensed_force() const {
     return condensed_force_;
@@ -46,10 +51,16 @@ public:
   Eigen::VectorXd mode_increment(const Eigen::VectorXd &displacement_increment) const;
 
   /// Internal force [N] on all components at given modes, nothing condensed. Needs det F > 0.
-  Eigen::VectorXd internal_force(const Eigen::VectorXd &displacement,
-                                 const Eigen::VectorXd &modes) const;
+  Eigen::VectorXd internal_force(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes,
+                                 const Overstress<dim> &overstress = {}) const;
+  /// Second Piola-Kirchhoff stress [Pa] at every point of what relaxes (relaxing_stress).
+  Eigen::VectorXd relaxing_stresses(const Eigen::VectorXd &displacement,
+                                    const Eigen::VectorXd &modes) const;
   /// Smallest det F over all points.
   double smallest_det(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes) const;
+  /// Strain energy of every cell [J] (2-D: per metre of depth).
+  Eigen::VectorXd energy_of_cells(const Eigen::VectorXd &displacement,
+                                  const Eigen::VectorXd &modes) const;
   /// [J]
   double strain_energy(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes) const;
   /// Mean Cauchy stress [Pa] of every cell with its out-of-plane part: xx yy zz xy (xz yz), one
@@ -68,9 +79,11 @@ private:
   void build_pattern();
   void build_mass(double density);
   void clear();
-  template <int nodes, int modes, class Law>
-  double sweep(const Law &law, const Eigen::VectorXd &displacement,
-               const Eigen::VectorXd &modes_in);
+  template <int nodes, int modes>
+  double sweep(const Eigen::VectorXd &displacement, const Eigen::VectorXd &modes_in,
+               const Overstress<dim> &overstress);
+  template <class Action>
+  void for_each_volume_field(const Eigen::VectorXd &displacement, Action &&action) const;
   template <int nodes, int modes> void scatter(int cell, const Condensed<dim, nodes, modes> &c);
 
   const Discretisation<dim> &discretisation_;

@@ -11,14 +11,22 @@
 namespace sluice::solid {
 namespace {
 
+template <int dim> Interface<dim> interface_of(const SolidSolver<dim> &solver) {
+  const auto &wetted = solver.supports().wetted;
+  if constexpr (dim == 3)
+    if (solver.params().interface == "plane")
+      return plane_interface(solver.discretisation(), wetted);
+  return wetted_interface(solver.discretisation(), wetted);
+}
+
 /// One coupled run.
 template <int dim> class Run {
 public:
   Run(const SolidParams &params, const bridge::CaseSettings &settings, std::filesystem::path folder)
       : solver_(params), folder_(std::move(folder)), output_interval_(settings.output_interval),
-        surface_(wetted_interface(solver_.discretisation(), solver_.clamped_side())),
-        progress_("solid", settings.end_time), state_(solver_.initial_state()),
-        forces_(dim * surface_.nodes.size()) {}
+        surface_(interface_of(solver_)), progress_("solid", settings.end_time),
+        state_(solver_.initial_state()),
+        forces_(static_cast<std::size_t>(surface_.mesh.dim * surface_.n_nodes())) {}
 
   void coupled(bridge::Participant &bridge) {
     bridge.set_mesh(surface_.mesh);
@@ -32,7 +40,7 @@ public:
       }
       const double dt = bridge.max_time_step_size();
       read_forces(bridge, dt);
-      state_ = solver_.step(start_, load_, dt, guess_ ? &*guess_ : nullptr);
+      state_ = solver_.advance(start_, load_, dt, guess_ ? &*guess_ : nullptr);
       write_motion(bridge);
       bridge.advance(dt);
       if (bridge.requires_reading_checkpoint()) {
@@ -65,8 +73,8 @@ private:
   // Sums from the solver's own load vector, about the accepted configuration.
   void finish_window(bridge::Participant &bridge) {
     bridge.report_totals(bridge::interface_totals(
-        dim, surface_.mesh.positions, surface_.gather(load_), surface_.gather(start_.displacement),
-        surface_.gather(state_.displacement)));
+        surface_.mesh.dim, surface_.mesh.positions, surface_.gather_forces(load_),
+        surface_.gather(start_.displacement), surface_.gather(state_.displacement)));
     history_->record(start_, state_, load_, bridge.time());
     progress_.update(bridge.time(), history_->note());
   }
@@ -99,7 +107,7 @@ void run_in(bridge::Participant &bridge, const SolidParams &params,
 } // namespace
 
 void run(bridge::Participant &bridge, const Config &config, const std::filesystem::path &folder) {
-  const auto params = config.read<SolidParams>("solid");
+  const auto params = read_params(config);
   if (params.dimension == 2)
     run_in<2>(bridge, params, folder);
   else

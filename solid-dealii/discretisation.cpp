@@ -9,8 +9,11 @@
 #include <deal.II/grid/grid_generator.h>
 #include <deal.II/grid/grid_tools.h>
 
+#include <Eigen/Geometry>
+
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 namespace sluice::solid {
 namespace {
@@ -49,31 +52,139 @@ template <int dim> void make_triangulation(const Box<dim> &box, dealii::Triangul
         grid);
 }
 
+// Files number corners in either sense: counter-clockwise, lower side first, makes volume positive.
+void turn_outward(const MeshFile &mesh, std::vector<int> &corners) {
+  const auto from_first = [&](std::size_t k) -> Vec<3> {
+    return mesh.points[static_cast<std::size_t>(corners[k])] -
+           mesh.points[static_cast<std::size_t>(corners[0])];
+  };
+  const Vec<3> area = from_first(2).cross(from_first(3)) + from_first(1).cross(from_first(2));
+  if (corners.size() == 4 && area.z() < 0)
+    std::reverse(corners.begin(), corners.end());
+  if (corners.size() == 8 && area.dot(from_first(4) + from_first(6) - from_first(2)) < 0)
+    std::rotate(corners.begin(), corners.begin() + 4, corners.end());
+}
+
+// A mesh file's cells as deal.II numbers corners: lexicographically, and every line of the mesh in
+// one direction from both sides.
+template <int dim> void make_triangulation(const MeshFile &mesh, dealii::Triangulation<dim> &grid) {
+  std::vector<dealii::Point<dim>> points;
+  for (const auto &x : mesh.points)
+    points.push_back(to_point<dim>(x.template head<dim>()));
+  std::vector<dealii::CellData<dim>> cells;
+  for (std::vector<int> corners : mesh.cells) {
+    turn_outward(mesh, corners);
+    dealii::CellData<dim> cell(corners.size());
+    for (std::size_t k = 0; k < corners.size(); ++k) {
+      constexpr std::size_t from_ring[4] = {0, 1, 3, 2};
+      cell.vertices[k] = static_cast<unsigned int>(corners[k / 4 * 4 + from_ring[k % 4]]);
+    }
+    cells.push_back(cell);
+  }
+  dealii::SubCellData none;
+  dealii::GridTools::delete_unused_vertices(points, cells, none);
+  dealii::GridTools::consistently_order_cells(cells);
+  grid.create_triangulation(points, cells, none);
+}
+
 // Makes all of a Discretisation from the mesh; one object so that the passes share FEValues'
 // inputs.
 template <int dim> class Builder {
 public:
-  Builder(const Box<dim> &box, ElementKind kind) {
+  template <class Source> Builder(const Source &source, ElementKind kind) {
     // With tasks the last bit of the set-up depends on how many threads there are.
     dealii::MultithreadInfo::set_thread_limit(1);
-    check_box(box);
     result_.kind = kind;
-    result_.degree = kind == ElementKind::q2 ? 2 : 1;
+    result_.degree = degree_of(kind);
     mesh_ = std::make_shared<DealiiMesh<dim>>(result_.degree);
-    make_triangulation(box, mesh_->triangulation);
+    make_triangulation(source, mesh_->triangulation);
     mesh_->nodes.reinit(mesh_->triangulation);
     mesh_->nodes.distribute_dofs(mesh_->element);
   }
 
-  Discretisation<dim> build() {
+  Discretisation<dim> build(const Box<dim> &) {
+    integrate();
+    for (std::size_t f = 0; f < result_.faces.size(); ++f)
+      result_.boundaries[name_of(result_.faces[f].side)].push_back(static_cast<int>(f));
+    return finish();
+  }
+
+  Discretisation<dim> build(const MeshFile &mesh) {
+    integrate();
+    for (auto &face : result_.faces)
+      face.side = Side::none;
+    for (const auto &[name, set] : mesh.node_sets)
+      name_faces(
+          name,
+          [&, &nodes = set](const std::vector<int> &corners) {
+            return std::all_of(corners.begin(), corners.end(),
+                               [&](int corner) { return nodes.contains(corner); });
+          },
+          mesh);
+    for (const auto &[name, set] : mesh.face_sets)
+      name_faces(
+          name,
+          [&, &faces = set](const std::vector<int> &corners) { return faces.contains(corners); },
+          mesh);
+    return finish();
+  }
+
+private:
+  void integrate() {
     set_sizes();
     integrate_cells();
     collect_boundary();
+  }
+  Discretisation<dim> finish() {
     result_.mesh = std::move(mesh_);
     return std::move(result_);
   }
 
-private:
+  // deal.II may have left out points of the file that no cell uses, so corners are found by place.
+  template <class IsNamed>
+  void name_faces(const std::string &name, const IsNamed &is_named, const MeshFile &mesh) {
+    if (point_of_vertex_.empty())
+      match_points(mesh);
+    std::vector<int> &faces = result_.boundaries[name];
+    for (std::size_t f = 0; f < result_.faces.size(); ++f)
+      if (is_named(corners_[f]))
+        faces.push_back(static_cast<int>(f));
+    if (faces.empty())
+      result_.boundaries.erase(name); // a set of cells or of inner nodes names no boundary
+  }
+
+  void match_points(const MeshFile &mesh) {
+    const auto less = [](const Vec<3> &a, const Vec<3> &b) {
+      return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());
+    };
+    std::map<Vec<3>, int, decltype(less)> index(less);
+    for (const auto &cell : mesh.cells)
+      for (const int corner : cell) {
+        Vec<3> x = mesh.points[static_cast<std::size_t>(corner)];
+        if constexpr (dim == 2)
+          x.z() = 0;
+        const auto [at, is_new] = index.try_emplace(x, corner);
+        check(is_new || at->second == corner,
+              "solid: points {} and {} of the mesh lie on the same place ({:.6g}, {:.6g}, {:.6g}); "
+              "merge duplicate nodes",
+              at->second, corner, x.x(), x.y(), x.z());
+      }
+    for (const auto &vertex : mesh_->triangulation.get_vertices()) {
+      Vec<3> x = Vec<3>::Zero();
+      x.template head<dim>() = to_vec<dim>(vertex);
+      point_of_vertex_.push_back(index.at(x));
+    }
+    for (const auto &cell : mesh_->triangulation.active_cell_iterators())
+      for (const unsigned int f : cell->face_indices())
+        if (cell->face(f)->at_boundary()) {
+          std::vector<int> corners;
+          for (unsigned int v = 0; v < cell->face(f)->n_vertices(); ++v)
+            corners.push_back(point_of_vertex_[cell->face(f)->vertex_index(v)]);
+          std::sort(corners.begin(), corners.end());
+          corners_.push_back(std::move(corners));
+        }
+  }
+
   void set_sizes() {
     with_element<dim>(result_.kind, [this]<int nodes, int modes>() {
       result_.nodes_per_cell = nodes;
@@ -92,7 +203,8 @@ private:
     using namespace dealii;
     const auto points = quadrature();
     FEValues<dim> fe(mapping_, mesh_->element, points,
-                     update_values | update_gradients | update_JxW_values | update_jacobians);
+                     update_values | update_gradients | update_JxW_values | update_jacobians |
+                         update_quadrature_points);
     FEValues<dim> centre(mapping_, mesh_->element, QMidpoint<dim>(), update_jacobians);
     std::vector<types::global_dof_index> numbers(mesh_->element.n_dofs_per_cell());
     for (const auto &cell : mesh_->nodes.active_cell_iterators()) {
@@ -102,6 +214,8 @@ private:
       add_nodes(*cell, numbers);
       for (unsigned int q = 0; q < points.size(); ++q)
         add_point(fe, q, points.point(q), centre.jacobian(0));
+      if (result_.kind == ElementKind::q2_p1)
+        add_pressure_basis(fe);
     }
     add_values(fe);
   }
@@ -145,6 +259,30 @@ private:
     return ratio * dealii::apply_transformation(centre.covariant_form(), unit);
   }
 
+  // 1, x, y(, z) made orthonormal over the cell by its own quadrature: functions of position, not
+  // of the unit cell, or the element would lose an order on cells that are no parallelepipeds.
+  void add_pressure_basis(const dealii::FEValues<dim> &fe) {
+    const auto n = static_cast<Eigen::Index>(fe.n_quadrature_points);
+    const Eigen::Map<const Eigen::VectorXd> weights(
+        result_.weights.data() + static_cast<Eigen::Index>(result_.weights.size()) - n, n);
+    Eigen::MatrixXd functions = Eigen::MatrixXd::Ones(n, dim + 1);
+    for (Eigen::Index q = 0; q < n; ++q)
+      functions.row(q).tail(dim) =
+          to_vec<dim>(fe.quadrature_point(static_cast<unsigned int>(q))).transpose();
+    const double volume = weights.sum();
+    for (int i = 0; i <= dim; ++i) {
+      if (i > 0) // about the centre first: far from the origin 1 and x are nearly the same
+        functions.col(i).array() -= weights.dot(functions.col(i)) / volume;
+      for (int k = 0; k < i; ++k)
+        functions.col(i) -=
+            weights.dot(functions.col(i).cwiseProduct(functions.col(k))) * functions.col(k);
+      functions.col(i) /= std::sqrt(weights.dot(functions.col(i).cwiseAbs2()));
+    }
+    for (Eigen::Index q = 0; q < n; ++q)
+      for (int i = 0; i <= dim; ++i)
+        result_.pressure_basis.push_back(functions(q, i));
+  }
+
   void add_values(const dealii::FEValues<dim> &fe) {
     for (unsigned int q = 0; q < fe.n_quadrature_points; ++q)
       for (unsigned int k = 0; k < fe.dofs_per_cell; ++k)
@@ -154,6 +292,7 @@ private:
   void collect_boundary() {
     using namespace dealii;
     const QGauss<dim - 1> points(static_cast<unsigned int>(result_.degree + 1));
+    result_.points_per_face = static_cast<int>(points.size());
     FEFaceValues<dim> fe(mapping_, mesh_->element, points,
                          update_values | update_gradients | update_JxW_values |
                              update_normal_vectors | update_quadrature_points);
@@ -206,27 +345,63 @@ private:
   dealii::MappingQ1<dim> mapping_;
   std::shared_ptr<DealiiMesh<dim>> mesh_;
   Discretisation<dim> result_;
+  std::vector<int> point_of_vertex_;      // of the file, for every vertex of deal.II
+  std::vector<std::vector<int>> corners_; // sorted points of the file, for every boundary face
 };
 
 } // namespace
 
-template <int dim> std::vector<int> Discretisation<dim>::side_nodes(Side side) const {
+const char *name_of(Side side) {
+  constexpr const char *names[] = {"left", "right", "lower", "upper", "near", "far", "none"};
+  return names[static_cast<int>(side)];
+}
+
+template <int dim>
+const std::vector<int> &Discretisation<dim>::boundary(const std::string &name) const {
+  const auto found = boundaries.find(name);
+  if (found != boundaries.end())
+    return found->second;
+  std::string known;
+  for (const auto &[there, faces_there] : boundaries)
+    known += fmt::format("{}{} ({} faces)", known.empty() ? "" : ", ", there, faces_there.size());
+  fail("solid: the mesh has no boundary '{}'; it has {}", name,
+       known.empty() ? "no named boundary at all" : known);
+}
+
+template <int dim>
+std::vector<int> Discretisation<dim>::nodes_of(const std::vector<int> &some_faces) const {
   std::vector<int> found;
-  for (const auto &face : faces)
-    if (face.side == side)
-      found.insert(found.end(), face.nodes.begin(), face.nodes.end());
+  for (const int f : some_faces) {
+    const auto &of_face = faces[static_cast<std::size_t>(f)].nodes;
+    found.insert(found.end(), of_face.begin(), of_face.end());
+  }
   std::sort(found.begin(), found.end());
   found.erase(std::unique(found.begin(), found.end()), found.end());
   return found;
 }
 
+template <int dim> int Discretisation<dim>::nearest_node(const Vec<dim> &position) const {
+  const auto nearest =
+      std::min_element(nodes.begin(), nodes.end(), [&](const Vec<dim> &a, const Vec<dim> &b) {
+        return (a - position).squaredNorm() < (b - position).squaredNorm();
+      });
+  return static_cast<int>(nearest - nodes.begin());
+}
+
 template <int dim> Discretisation<dim> discretise(const Box<dim> &box, ElementKind kind) {
-  return Builder<dim>(box, kind).build();
+  check_box(box);
+  return Builder<dim>(box, kind).build(box);
+}
+
+template <int dim> Discretisation<dim> discretise(const MeshFile &mesh, ElementKind kind) {
+  return Builder<dim>(mesh, kind).build(mesh);
 }
 
 template struct Discretisation<2>;
 template struct Discretisation<3>;
 template Discretisation<2> discretise(const Box<2> &, ElementKind);
 template Discretisation<3> discretise(const Box<3> &, ElementKind);
+template Discretisation<2> discretise<2>(const MeshFile &, ElementKind);
+template Discretisation<3> discretise<3>(const MeshFile &, ElementKind);
 
 } // namespace sluice::solid

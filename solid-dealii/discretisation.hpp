@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: MIT
-// From a box of quadrilaterals or hexahedra to what the kernels need: node positions, cells, and
-// the gradients of shape functions and incompatible modes in the reference configuration, computed
-// once. deal.II makes the mesh, numbers the nodes and integrates; its headers stay behind this one.
+// From a box or a mesh file of quadrilaterals or hexahedra to what the kernels need: node
+// positions, cells, and the gradients of shape functions and incompatible modes in the reference
+// configuration, computed once. deal.II makes the mesh, numbers the nodes and integrates; its
+// headers stay behind this one.
 #pragma once
 
 #include "solid-dealii/element.hpp"
+#include "solid-dealii/mesh_file.hpp"
 
 #include <array>
 #include <functional>
@@ -13,8 +15,12 @@
 
 namespace sluice::solid {
 
-/// Sides of a box; the values are deal.II's boundary ids of a colorized box.
-enum class Side : int { left = 0, right = 1, lower = 2, upper = 3, near = 4, far = 5 };
+/// Sides of a box; the values are deal.II's boundary ids of a colorized box. A face of a mesh from
+/// a file is on no side: its parts of the boundary have the names of the file.
+enum class Side : int { left = 0, right = 1, lower = 2, upper = 3, near = 4, far = 5, none = 6 };
+
+/// The name of a side as a boundary: "left", "right", "lower", "upper", "near" or "far".
+const char *name_of(Side side);
 
 /// A box of equal cells; `shape`, when given, then moves every vertex (for distorted meshes).
 template <int dim> struct Box {
@@ -57,8 +63,11 @@ template <int dim> struct Discretisation {
   std::vector<double> gradients;        ///< [cell][point][column][component] [1/m]
   std::vector<double> weights;          ///< [cell][point] [m^dim]
   std::vector<double> values;           ///< [point][node] shape functions
+  std::vector<double> pressure_basis;   ///< [cell][point][function], q2-p1 only (element_mixed.hpp)
   std::vector<BoundaryFace<dim>> faces; ///< of the whole boundary
-  std::vector<BoundaryPoint<dim>> boundary_points;
+  std::vector<BoundaryPoint<dim>> boundary_points; ///< points_per_face for every face, in order
+  int points_per_face = 0;
+  std::map<std::string, std::vector<int>> boundaries; ///< faces of every named part of the boundary
   std::shared_ptr<const DealiiMesh<dim>> mesh;
 
   int n_cells() const { return static_cast<int>(cell_nodes.size()) / nodes_per_cell; }
@@ -67,10 +76,20 @@ template <int dim> struct Discretisation {
   int n_modes() const { return dim * modes_per_cell * n_cells(); }
   int columns() const { return nodes_per_cell + modes_per_cell; }
   /// Nodes of one side, each once, in ascending number.
-  std::vector<int> side_nodes(Side side) const;
+  std::vector<int> side_nodes(Side side) const { return nodes_of(boundary(name_of(side))); }
+  /// Faces of a named part of the boundary. Throws UserError that lists the names there are.
+  const std::vector<int> &boundary(const std::string &name) const;
+  /// Nodes of some faces, each once, in ascending number.
+  std::vector<int> nodes_of(const std::vector<int> &some_faces) const;
+  /// The node nearest to a position [m].
+  int nearest_node(const Vec<dim> &position) const;
 };
 
 /// Throws UserError for a box without extent or cells, or whose cells are inverted by `shape`.
 template <int dim> Discretisation<dim> discretise(const Box<dim> &box, ElementKind kind);
+
+/// The same for a mesh from a file, whose cells may be numbered in either sense. Throws UserError
+/// for cells without volume, and for a named part of the boundary that has no face.
+template <int dim> Discretisation<dim> discretise(const MeshFile &mesh, ElementKind kind);
 
 } // namespace sluice::solid

@@ -2,9 +2,9 @@
 // The element kernel: internal force and tangent of one element, total Lagrangian.
 //
 //   F = I + sum_a u_a (x) G_a,   f_a = sum_q w_q tau g_a,   g_a = F^-T G_a
-//   K_ab = sum_q w_q [ lambda h_a (x) h_b + m ((g_a . h_b) A + h_b (x) h_a) + (g_a . tau g_b) I ]
-//   with h_a = A g_a and (A, lambda, m) the material's tangent (material.hpp).
+//   K_ab = sum_q w_q [ g_a . (J c) . g_b + (g_a . tau g_b) I ]
 //
+// in one of the two shapes of J c that a material answers with (response.hpp).
 // A column a is a node or an internal (incompatible) mode; G_a is its gradient in the reference
 // configuration, cached by Discretisation. Modes are condensed: they never leave the element.
 //
@@ -20,34 +20,55 @@
 #include <Eigen/Dense>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 
 namespace sluice::solid {
 
-enum class ElementKind { incompatible_modes, q1, q2 };
+/// q2_p1 is q2 with volume change and pressure in a discontinuous linear space (element_mixed.hpp).
+enum class ElementKind { incompatible_modes, q1, q2, q3, q2_p1 };
 
-/// `name` is the key's value in a case file: "incompatible-modes", "q1" or "q2".
+/// `name` is the key's value in a case file.
 inline ElementKind element_kind(std::string_view name) {
-  if (name == "incompatible-modes")
-    return ElementKind::incompatible_modes;
-  check(name == "q1" || name == "q2",
-        "solid: unknown element '{}'; give incompatible-modes, q1 or q2", name);
-  return name == "q1" ? ElementKind::q1 : ElementKind::q2;
+  constexpr std::array<std::pair<std::string_view, ElementKind>, 5> kinds{
+      {{"incompatible-modes", ElementKind::incompatible_modes},
+       {"q1", ElementKind::q1},
+       {"q2", ElementKind::q2},
+       {"q3", ElementKind::q3},
+       {"q2-p1", ElementKind::q2_p1}}};
+  for (const auto &[known, kind] : kinds)
+    if (name == known)
+      return kind;
+  fail("solid: unknown element '{}'; give incompatible-modes, q1, q2, q3 or q2-p1", name);
+}
+
+inline int degree_of(ElementKind kind) {
+  return kind == ElementKind::q3                                 ? 3
+         : kind == ElementKind::q2 || kind == ElementKind::q2_p1 ? 2
+                                                                 : 1;
 }
 
 /// Calls action.operator()<nodes, modes>() with the sizes of the element as constants.
 template <int dim, class Action> void with_element(ElementKind kind, Action &&action) {
   constexpr int corners = 1 << dim;
-  constexpr int lattice = dim == 2 ? 9 : 27;
   switch (kind) {
   case ElementKind::incompatible_modes:
     return action.template operator()<corners, dim>();
   case ElementKind::q1:
     return action.template operator()<corners, 0>();
   case ElementKind::q2:
-    return action.template operator()<lattice, 0>();
+  case ElementKind::q2_p1:
+    return action.template operator() < dim == 2 ? 9 : 27, 0 > ();
+  case ElementKind::q3:
+    if constexpr (dim == 2)
+      return action.template operator()<16, 0>();
+    else
+      fail("solid: the element q3 exists in two dimensions only; use q2 or incompatible-modes");
   }
 }
+
+/// Quadrature points of the largest element.
+template <int dim> inline constexpr int max_points = dim == 2 ? 16 : 27;
 
 /// One column per node or mode.
 template <int dim, int columns> using Columns = Eigen::Matrix<double, dim, columns>;
@@ -69,10 +90,10 @@ Mat<dim> deformation_gradient(const Columns<dim, columns> &displacement,
 
 /// Adds the tangent of one point to the lower block triangle.
 template <int dim, int columns>
-void add_tangent(const Response<dim> &r, const Columns<dim, columns> &g, double weight,
+void add_tangent(const MetricResponse<dim> &r, const Columns<dim, columns> &g, double weight,
                  ElementSystem<dim, columns> &element) {
   const Columns<dim, columns> h = r.metric * g;
-  const Columns<dim, columns> t = weight * (r.stress * g);
+  const Columns<dim, columns> t = weight * (r.carried * g);
   const Columns<dim, columns> lh = weight * r.volumetric * h;
   const Columns<dim, columns> mh = weight * r.shear * h;
   for (int b = 0; b < columns; ++b)
@@ -84,23 +105,45 @@ void add_tangent(const Response<dim> &r, const Columns<dim, columns> &g, double 
     }
 }
 
-/// Adds one quadrature point; returns false, adding nothing, where det F is not positive.
-template <int dim, int columns, class Law>
-bool add_point(const Law &law, const Columns<dim, columns> &displacement,
-               const Columns<dim, columns> &gradient, double weight, bool with_tangent,
-               ElementSystem<dim, columns> &element) {
-  const Mat<dim> F = deformation_gradient<dim, columns>(displacement, gradient);
-  const double det_f = F.determinant();
-  constexpr double lowest = -std::numeric_limits<double>::infinity();
-  element.min_det = std::isnan(det_f) ? lowest : std::min(element.min_det, det_f);
-  if (!(det_f > 0))
-    return false;
-  const Columns<dim, columns> g = F.inverse().transpose() * gradient;
-  const Response<dim> response = law.template response<dim>(F, det_f);
+/// Strain of the columns: one column per component, engineering shear.
+template <int dim, int columns>
+Eigen::Matrix<double, voigt_size<dim>, dim * columns>
+strain_operator(const Columns<dim, columns> &g) {
+  Eigen::Matrix<double, voigt_size<dim>, dim * columns> B;
+  B.setZero();
+  for (int a = 0; a < columns; ++a)
+    for (int k = 0; k < voigt_size<dim>; ++k) {
+      const int i = voigt_row<dim>(k), j = voigt_column<dim>(k);
+      B(k, dim * a + i) = g(j, a);
+      B(k, dim * a + j) = g(i, a);
+    }
+  return B;
+}
+
+template <int dim, int columns>
+void add_tangent(const VoigtResponse<dim> &r, const Columns<dim, columns> &g, double weight,
+                 ElementSystem<dim, columns> &element) {
+  const auto B = strain_operator<dim, columns>(g);
+  Eigen::Matrix<double, voigt_size<dim>, dim * columns> CB;
+  for (int k = 0; k < dim * columns; ++k) // by columns: one product of all unrolls without limit
+    CB.col(k).noalias() = weight * (r.tangent * B.col(k));
+  for (int k = 0; k < dim * columns; ++k)
+    element.tangent.col(k).noalias() += B.transpose() * CB.col(k);
+  const Columns<dim, columns> t = weight * (r.carried * g);
+  for (int b = 0; b < columns; ++b)
+    for (int a = b; a < columns; ++a)
+      element.tangent.template block<dim, dim>(dim * a, dim * b).diagonal().array() +=
+          g.col(a).dot(t.col(b));
+}
+
+/// Adds one quadrature point. `push` G are the gradients that the response acts on.
+template <int dim, int columns, class Response>
+void add_point(const Response &response, const Columns<dim, columns> &gradient, double weight,
+               bool with_tangent, ElementSystem<dim, columns> &element) {
+  const Columns<dim, columns> g = response.push * gradient;
   element.force += weight * (response.stress * g);
   if (with_tangent)
     add_tangent<dim, columns>(response, g, weight, element);
-  return true;
 }
 
 /// Fills the upper block triangle from the lower one: dead loads and hyperelasticity are symmetric.

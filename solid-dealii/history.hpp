@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 // What a run leaves behind: series window by window, fields, and the summary.
 //
-//   tip.csv           displacement of the free end: middle, front corner, back corner
+//   tip.csv           displacement of a box's free end: middle, front corner, back corner
+//   probes.csv        displacement of every [[solid.probe]]
+//   reactions.csv     force and moment of the supports on the body
 //   solid_loads.csv   sums of the load vector of the window, at the accepted end of the window
 //   solid_energy.csv  kinetic and strain energy, work of the loads since the start
 //   solid.pvd         fields for ParaView, every output_interval
+//   solid_state.h5    the state at the last output, to go on from
 //   solid_summary.json
 #pragma once
 
@@ -22,8 +25,10 @@ namespace sluice::solid {
 
 template <int dim> class History {
 public:
-  /// Fields are written every `output_interval` [s]; 0: none. Writes the state at rest at once.
-  History(const SolidSolver<dim> &solver, std::filesystem::path folder, double output_interval);
+  /// Fields are written every `output_interval` [s]; 0: none. Writes the state at rest at once, or
+  /// `first` at `time` [s] when a run goes on from it.
+  History(const SolidSolver<dim> &solver, std::filesystem::path folder, double output_interval,
+          const SolidState *first = nullptr, double time = 0);
 
   /// The window that led from `start` to `state` at `time` [s] under nodal forces `load` [N].
   void record(const SolidState &start, const SolidState &state, const Eigen::VectorXd &load,
@@ -35,6 +40,8 @@ public:
 
 private:
   void record_state(const SolidState &state, double time);
+  void record_tip(const SolidState &state, double time);
+  void record_probes(const SolidState &state, double time);
   void record_loads(const SolidState &start, const SolidState &state, const Eigen::VectorXd &load,
                     double time);
   void write_fields(const SolidState &state, double time);
@@ -42,14 +49,16 @@ private:
   const SolidSolver<dim> &solver_;
   std::filesystem::path folder_;
   double output_interval_;
-  FreeEnd<dim> end_;
-  CsvWriter tip_, loads_, energy_;
+  std::optional<FreeEnd<dim>> end_; // of a box
+  std::vector<int> probe_nodes_;
+  std::optional<CsvWriter> tip_, probes_;
+  CsvWriter loads_, energy_, reactions_;
   std::optional<OutputVtk<dim>> fields_;
   long fields_written_ = 0;
   long windows_ = 0;
   double output_seconds_ = 0;
   double last_time_ = 0;
-  Vec<dim> last_tip_ = Vec<dim>::Zero();
+  Vec<dim> last_tip_ = Vec<dim>::Zero(); // of the free end, or of the first probe
   Stopwatch watch_;
 };
 

@@ -25,16 +25,24 @@ Mat<3> cofactor(const Mat<3> &F) {
   return c;
 }
 
+// Calls action(point, nodes of its cell) for every quadrature point of some faces.
+template <int dim, class Action>
+void for_each_boundary_point(const Discretisation<dim> &d, const std::vector<int> &faces,
+                             Action &&action) {
+  for (const int face : faces)
+    for (int q = 0; q < d.points_per_face; ++q) {
+      const auto &point = d.boundary_points[static_cast<std::size_t>(face * d.points_per_face + q)];
+      action(point, d.cell_nodes.data() + point.cell * d.nodes_per_cell);
+    }
+}
+
 } // namespace
 
 template <int dim>
-Eigen::VectorXd pressure_forces(const Discretisation<dim> &d, Side side,
+Eigen::VectorXd pressure_forces(const Discretisation<dim> &d, const std::vector<int> &faces,
                                 const Hydrostatic &pressure, const Eigen::VectorXd &displacement) {
   Eigen::VectorXd forces = Eigen::VectorXd::Zero(d.n_dofs());
-  for (const auto &point : d.boundary_points) {
-    if (point.side != side)
-      continue;
-    const int *nodes = d.cell_nodes.data() + point.cell * d.nodes_per_cell;
+  for_each_boundary_point(d, faces, [&](const BoundaryPoint<dim> &point, const int *nodes) {
     Mat<dim> F = Mat<dim>::Identity();
     for (int a = 0; a < d.nodes_per_cell; ++a)
       F += displacement.template segment<dim>(dim * nodes[a]) * point.gradients.col(a).transpose();
@@ -42,7 +50,19 @@ Eigen::VectorXd pressure_forces(const Discretisation<dim> &d, Side side,
         -pressure(point.position.y()) * point.weight * (cofactor(F) * point.normal);
     for (int a = 0; a < d.nodes_per_cell; ++a)
       forces.template segment<dim>(dim * nodes[a]) += point.values[a] * traction;
-  }
+  });
+  return forces;
+}
+
+template <int dim>
+Eigen::VectorXd traction_forces(const Discretisation<dim> &d, const std::vector<int> &faces,
+                                const std::function<Vec<dim>(const Vec<dim> &)> &traction) {
+  Eigen::VectorXd forces = Eigen::VectorXd::Zero(d.n_dofs());
+  for_each_boundary_point(d, faces, [&](const BoundaryPoint<dim> &point, const int *nodes) {
+    const Vec<dim> force = point.weight * traction(point.position);
+    for (int a = 0; a < d.nodes_per_cell; ++a)
+      forces.template segment<dim>(dim * nodes[a]) += point.values[a] * force;
+  });
   return forces;
 }
 
@@ -65,10 +85,14 @@ LoadSums<dim> sum_loads(const Discretisation<dim> &d, const Eigen::VectorXd &loa
   return sums;
 }
 
-template Eigen::VectorXd pressure_forces(const Discretisation<2> &, Side, const Hydrostatic &,
-                                         const Eigen::VectorXd &);
-template Eigen::VectorXd pressure_forces(const Discretisation<3> &, Side, const Hydrostatic &,
-                                         const Eigen::VectorXd &);
+template Eigen::VectorXd pressure_forces(const Discretisation<2> &, const std::vector<int> &,
+                                         const Hydrostatic &, const Eigen::VectorXd &);
+template Eigen::VectorXd traction_forces(const Discretisation<2> &, const std::vector<int> &,
+                                         const std::function<Vec<2>(const Vec<2> &)> &);
+template Eigen::VectorXd pressure_forces(const Discretisation<3> &, const std::vector<int> &,
+                                         const Hydrostatic &, const Eigen::VectorXd &);
+template Eigen::VectorXd traction_forces(const Discretisation<3> &, const std::vector<int> &,
+                                         const std::function<Vec<3>(const Vec<3> &)> &);
 template LoadSums<2> sum_loads(const Discretisation<2> &, const Eigen::VectorXd &,
                                const Eigen::VectorXd &, const Eigen::VectorXd &);
 template LoadSums<3> sum_loads(const Discretisation<3> &, const Eigen::VectorXd &,

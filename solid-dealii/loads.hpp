@@ -20,8 +20,22 @@ struct Hydrostatic {
 /// with the material point X; its direction and area follow `displacement`: zero for a dead load,
 /// the current one for a follower load. Source: Nanson's formula, n da = cof(F) N dA.
 template <int dim>
+Eigen::VectorXd pressure_forces(const Discretisation<dim> &discretisation,
+                                const std::vector<int> &faces, const Hydrostatic &pressure,
+                                const Eigen::VectorXd &displacement);
+template <int dim>
 Eigen::VectorXd pressure_forces(const Discretisation<dim> &discretisation, Side side,
-                                const Hydrostatic &pressure, const Eigen::VectorXd &displacement);
+                                const Hydrostatic &pressure, const Eigen::VectorXd &displacement) {
+  return pressure_forces(discretisation, discretisation.boundary(name_of(side)), pressure,
+                         displacement);
+}
+
+/// Nodal forces [N] of a dead traction [Pa] per reference area on some faces, as a function of the
+/// reference position [m].
+template <int dim>
+Eigen::VectorXd traction_forces(const Discretisation<dim> &discretisation,
+                                const std::vector<int> &faces,
+                                const std::function<Vec<dim>(const Vec<dim> &)> &traction);
 
 /// Sums of a nodal load over the nodes, with the sums of magnitudes against which a difference is
 /// judged. Two dimensions: per metre of depth.

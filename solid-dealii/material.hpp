@@ -1,110 +1,87 @@
 // SPDX-License-Identifier: MIT
-// Hyperelastic laws in closed form: strain energy, Kirchhoff stress and its tangent.
+// The material of a body: one law, with true plane strain or plane stress in two dimensions.
 //
-// In two dimensions the state is true plane strain: F33 = 1, so the out-of-plane stretch enters no
-// sum below and the two-dimensional formulas are those of three dimensions with nothing dropped.
-//
-// Both laws have a spatial (Lie derivative) tangent of one shape, with a symmetric "metric" A:
-//   J c_ijkl = lambda A_ij A_kl + m (A_ik A_jl + A_il A_jk)
-//   neo-Hookean             A = I,         m = mu - lambda ln J
-//   St. Venant-Kirchhoff    A = b = F F^T, m = mu
-// so one element kernel serves both, without a fourth-order tensor.
-// Source: Bonet and Wood, Nonlinear Continuum Mechanics for Finite Element Analysis, 2nd ed.
-// (2008), sections 6.4.3 (neo-Hookean) and 6.3.1 (St. Venant-Kirchhoff); tau = J sigma.
+// Laws answer for a batch of points (one cell), so the choice of law costs one call per cell.
+// In plane stress the stretch out of the plane follows from tau33 = 0 at every point.
 #pragma once
 
-#include "bridge/base/check.hpp"
-#include "bridge/base/vec.hpp"
+#include "solid-dealii/laws_split.hpp"
 
-#include <Eigen/Dense>
-
-#include <cmath>
+#include <span>
+#include <string>
 #include <string_view>
 #include <variant>
+#include <vector>
 
 namespace sluice::solid {
 
-/// Kirchhoff stress and tangent at one point; the tangent in the shape of the file head.
-template <int dim> struct Response {
-  Mat<dim> stress;     ///< tau [Pa]
-  Mat<dim> metric;     ///< A [1]
-  double volumetric{}; ///< lambda [Pa]
-  double shear{};      ///< m [Pa]
+/// Neo-Hookean distortion with its own volume energy, Mooney-Rivlin, Yeoh.
+using MooneyRivlin = InvariantLaw<MooneyRivlinEnergy>;
+using Yeoh = InvariantLaw<YeohEnergy>;
 
-  /// Change of tau [Pa] without its rotation for a symmetric gradient `rate`: (J c) : rate.
-  Mat<dim> tangent_times(const Mat<dim> &rate) const {
-    const Mat<dim> symmetric = 0.5 * (rate + rate.transpose());
-    return volumetric * metric.cwiseProduct(symmetric).sum() * metric +
-           2 * shear * metric * symmetric * metric;
-  }
+using Law =
+    std::variant<NeoHookean, SaintVenantKirchhoff, LinearElastic, MooneyRivlin, Yeoh, Ogden>;
+
+enum class Plane { strain, stress };
+
+/// Viscous stress beside that of the law (viscosity.hpp): `factor` times the stress of the law's
+/// part that relaxes, and F h F^T with h per point (second Piola-Kirchhoff [Pa], Voigt).
+template <int dim> struct Overstress {
+  double factor = 0;
+  std::span<const double> stress = {}; ///< [point][component]; empty: none
 };
 
-/// Lame's constants [Pa] of small strains.
-struct Lame {
-  double lambda = 0;
-  double mu = 0;
+struct Material {
+  Law law;
+  Plane plane = Plane::strain;
+
+  /// Whether MetricResponse can hold its tangent; else ask for VoigtResponse.
+  bool has_metric_tangent() const;
+  /// The energy of volume of a split law; null for the others.
+  const Volume *volume() const;
+  /// Whether the law is one of small strain, for which no element can be inverted.
+  bool is_small_strain() const { return std::holds_alternative<LinearElastic>(law); }
 };
 
-/// From Young's modulus [Pa] and Poisson's ratio in (-1, 0.5).
-inline Lame lame_constants(double youngs_modulus, double poisson_ratio) {
-  check(youngs_modulus > 0, "solid: Young's modulus is {} Pa; it must be positive", youngs_modulus);
-  check(poisson_ratio > -1 && poisson_ratio < 0.5,
-        "solid: Poisson's ratio is {}; it must lie between -1 and 0.5", poisson_ratio);
-  const double mu = youngs_modulus / (2 * (1 + poisson_ratio));
-  return {2 * mu * poisson_ratio / (1 - 2 * poisson_ratio), mu};
-}
+/// Strain energy per reference volume [J/m^3] at a deformation gradient.
+template <int dim> double strain_energy_density(const Material &material, const Mat<dim> &F);
 
-/// W = mu/2 (tr b - 3) - mu ln J + lambda/2 (ln J)^2;  tau = mu (b - I) + lambda ln J I.
-struct NeoHookean {
-  Lame lame;
+/// Cauchy stress [Pa] with its part out of the plane.
+template <int dim> Mat<3> cauchy_stress(const Material &material, const Mat<dim> &F);
 
-  /// Strain energy per reference volume [J/m^3].
-  template <int dim> double energy(const Mat<dim> &F) const {
-    const double log_j = std::log(F.determinant());
-    return 0.5 * lame.mu * (F.squaredNorm() - dim) - lame.mu * log_j +
-           0.5 * lame.lambda * log_j * log_j;
-  }
-  /// Needs det F > 0.
-  template <int dim> Response<dim> response(const Mat<dim> &F, double det_f) const {
-    const Mat<dim> one = Mat<dim>::Identity();
-    const double log_j = std::log(det_f);
-    return {lame.mu * (F * F.transpose() - one) + lame.lambda * log_j * one, one, lame.lambda,
-            lame.mu - lame.lambda * log_j};
-  }
+/// Fills `responses`, one per deformation gradient; needs det F > 0.
+template <int dim, class Response>
+void respond(const Material &material, std::span<const Mat<dim>> F,
+             const Overstress<dim> &overstress, std::span<Response> responses);
+
+/// The part of `respond` that belongs to the distortion; a split law in plane strain only.
+template <int dim>
+void respond_distortion(const Material &material, std::span<const Mat<dim>> F,
+                        const Overstress<dim> &overstress, std::span<VoigtResponse<dim>> responses);
+
+/// Second Piola-Kirchhoff stress [Pa] of the part of the law that relaxes: of the distortion for a
+/// split law, all of it for the others.
+template <int dim>
+Eigen::Matrix<double, voigt_size<dim>, 1> relaxing_stress(const Material &material,
+                                                          const Mat<dim> &F);
+
+/// Constants of a law as a case file gives them; each law uses its own.
+struct LawConstants {
+  double youngs_modulus = 0;      ///< [Pa]
+  double poisson_ratio = 0;       ///< [1]
+  double c10 = 0, c01 = 0;        ///< [Pa] Mooney-Rivlin
+  double c20 = 0, c30 = 0;        ///< [Pa] Yeoh
+  std::vector<double> mu = {};    ///< [Pa] Ogden
+  std::vector<double> alpha = {}; ///< [1] Ogden
 };
 
-/// W = lambda/2 (tr E)^2 + mu E:E;  S = lambda tr E I + 2 mu E;  tau = F S F^T.
-struct SaintVenantKirchhoff {
-  Lame lame;
-
-  /// Strain energy per reference volume [J/m^3].
-  template <int dim> double energy(const Mat<dim> &F) const {
-    const Mat<dim> E = green_lagrange_strain(F);
-    return 0.5 * lame.lambda * E.trace() * E.trace() + lame.mu * E.squaredNorm();
-  }
-  template <int dim> Response<dim> response(const Mat<dim> &F, double /*det_f*/) const {
-    const Mat<dim> E = green_lagrange_strain(F);
-    const Mat<dim> S = lame.lambda * E.trace() * Mat<dim>::Identity() + 2 * lame.mu * E;
-    return {F * S * F.transpose(), F * F.transpose(), lame.lambda, lame.mu};
-  }
-
-private:
-  template <int dim> static Mat<dim> green_lagrange_strain(const Mat<dim> &F) {
-    return 0.5 * (F.transpose() * F - Mat<dim>::Identity());
-  }
-};
-
-/// Visited once per sweep over the elements, never per point.
-using Material = std::variant<NeoHookean, SaintVenantKirchhoff>;
-
-/// `law` is "neo-hookean" or "st-venant-kirchhoff".
+/// `law` is "linear-elastic", "st-venant-kirchhoff", "neo-hookean", "neo-hookean-split",
+/// "mooney-rivlin", "yeoh" or "ogden". Throws UserError for constants without a positive shear
+/// modulus at small strain.
+Material make_material(std::string_view law, const LawConstants &constants,
+                       Plane plane = Plane::strain);
 inline Material make_material(std::string_view law, double youngs_modulus, double poisson_ratio) {
-  const Lame lame = lame_constants(youngs_modulus, poisson_ratio);
-  if (law == "neo-hookean")
-    return NeoHookean{lame};
-  check(law == "st-venant-kirchhoff",
-        "solid: unknown material '{}'; give neo-hookean or st-venant-kirchhoff", law);
-  return SaintVenantKirchhoff{lame};
+  return make_material(law, LawConstants{youngs_modulus, poisson_ratio});
 }
 
 } // namespace sluice::solid

@@ -7,15 +7,16 @@
 namespace sluice::solid {
 
 template <int dim>
-Newton<dim>::Newton(Assembly<dim> &assembly, NewtonSettings settings)
-    : assembly_(assembly), settings_(settings), linear_solver_(assembly.tangent()),
+Newton<dim>::Newton(Assembly<dim> &assembly, NewtonSettings settings, LinearSolverKind kind)
+    : assembly_(assembly), settings_(settings),
+      linear_solver_(assembly.tangent(), kind, [&assembly] { return assembly.rigid_motions(); }),
       matrix_(assembly.tangent()) {}
 
 template <int dim>
 typename Newton<dim>::Residual Newton<dim>::evaluate(const Equation &equation,
                                                      const Iterate &iterate) {
   Residual r;
-  r.min_det = assembly_.linearise(iterate.displacement, iterate.modes);
+  r.min_det = assembly_.linearise(iterate.displacement, iterate.modes, overstress_);
   if (!(r.min_det > 0))
     return r;
   r.force = equation.internal_factor * assembly_.condensed_force() - equation.load;
@@ -28,8 +29,8 @@ typename Newton<dim>::Residual Newton<dim>::evaluate(const Equation &equation,
     r.force += inertia;
     r.reference = std::max(r.reference, assembly_.restrict_to_free(inertia).norm());
   }
-  r.round_off = assembly_.round_off_force(equation.internal_factor, equation.mass_factor,
-                                          iterate.displacement);
+  r.round_off = assembly_.round_off_force(equation.internal_factor * (1 + overstress_.factor),
+                                          equation.mass_factor, iterate.displacement);
   r.norm = std::hypot(assembly_.restrict_to_free(r.force).norm(), assembly_.mode_residual());
   return r;
 }
@@ -46,7 +47,7 @@ template <int dim> bool Newton<dim>::factorise(const Equation &equation) {
   return linear_solver_.factorise(matrix_);
 }
 
-template <int dim> Iterate Newton<dim>::increment(const Residual &r) const {
+template <int dim> Iterate Newton<dim>::increment(const Residual &r) {
   Iterate step{Eigen::VectorXd::Zero(r.force.size()), {}};
   assembly_.add_to_free(step.displacement, -1,
                         linear_solver_.solve(assembly_.restrict_to_free(r.force)));
@@ -71,9 +72,13 @@ typename Newton<dim>::Residual Newton<dim>::cut_back(const Equation &equation, I
   return residual;
 }
 
-template <int dim> NewtonReport Newton<dim>::solve(const Equation &equation, Iterate &iterate) {
+template <int dim>
+NewtonReport Newton<dim>::solve(const Equation &equation, Iterate &iterate,
+                                const Overstress<dim> &overstress) {
+  overstress_ = overstress;
   NewtonReport report;
   Residual residual = evaluate(equation, iterate);
+  double previous = 0;
   const auto failed = [&](std::string why) {
     report.failure = std::move(why);
     return report;
@@ -95,11 +100,20 @@ template <int dim> NewtonReport Newton<dim>::solve(const Equation &equation, Ite
     if (report.iterations == settings_.max_iterations)
       return failed(fmt::format("residual {:.3g} N of {:.3g} N after {} iterations", residual.norm,
                                 residual.reference, report.iterations));
-    if (!factorise(equation))
-      return failed(fmt::format("the tangent is singular after {} iterations (smallest det F "
-                                "{:.3g})",
-                                report.iterations, residual.min_det));
-    residual = cut_back(equation, iterate, increment(residual), residual.min_det);
+    if (!(residual.norm <= settings_.reuse_while_below * previous)) {
+      ++report.factorisations;
+      if (!factorise(equation))
+        return failed(fmt::format("the tangent is singular after {} iterations (smallest det F "
+                                  "{:.3g})",
+                                  report.iterations, residual.min_det));
+    }
+    previous = residual.norm;
+    const Iterate step = increment(residual);
+    report.linear_iterations += linear_solver_.last_iterations();
+    if (!step.displacement.allFinite())
+      return failed(fmt::format("the linear solver found no increment after {} iterations",
+                                report.iterations));
+    residual = cut_back(equation, iterate, step, residual.min_det);
   }
 }
 

@@ -35,6 +35,9 @@ struct Equation {
 struct NewtonSettings {
   double tolerance = 1e-9; ///< of the residual, relative to the largest force in the equation
   int max_iterations = 25;
+  /// Modified Newton: the factors of a tangent are used again as long as an iteration with them
+  /// leaves at most this part of the residual. 0: every iteration has its own.
+  double reuse_while_below = 0;
 };
 
 struct NewtonReport {
@@ -43,16 +46,21 @@ struct NewtonReport {
   double residual = 0;  ///< [N] Euclidean norm, forces on the modes included
   double reference = 0; ///< [N] largest of the norms of load, internal and inertial force
   double min_det = 0;   ///< smallest det F of the last iterate
-  std::string failure;  ///< why not, with the numbers
+  int factorisations = 0;
+  int linear_iterations = 0; ///< of conjugate gradients, all together
+  std::string failure;       ///< why not, with the numbers
 };
 
 template <int dim> class Newton {
 public:
-  Newton(Assembly<dim> &assembly, NewtonSettings settings);
+  Newton(Assembly<dim> &assembly, NewtonSettings settings,
+         LinearSolverKind kind = LinearSolverKind::automatic);
 
   /// Improves `iterate` until the residual is small; its fixed components stay. When the report
-  /// says that it has not converged, `iterate` is not usable.
-  NewtonReport solve(const Equation &equation, Iterate &iterate);
+  /// says that it has not converged, `iterate` is not usable. `overstress` belongs to the internal
+  /// force (viscosity.hpp).
+  NewtonReport solve(const Equation &equation, Iterate &iterate,
+                     const Overstress<dim> &overstress = {});
 
 private:
   struct Residual {
@@ -63,7 +71,7 @@ private:
     double round_off = 0; // norms below it mean nothing
   };
   Residual evaluate(const Equation &equation, const Iterate &iterate);
-  Iterate increment(const Residual &residual) const;
+  Iterate increment(const Residual &residual);
   bool factorise(const Equation &equation);
   Residual cut_back(const Equation &equation, Iterate &iterate, const Iterate &step,
                     double min_det);
@@ -73,6 +81,7 @@ private:
   NewtonSettings settings_;
   LinearSolver linear_solver_;
   SparseMatrix matrix_;
+  Overstress<dim> overstress_; // of the present solve
 };
 
 } // namespace sluice::solid

@@ -53,6 +53,10 @@ template <int dim> struct OutputVtk<dim>::Impl {
     using namespace dealii;
     const auto displacement = nodal(fields.displacement), velocity = nodal(fields.velocity);
     const auto pressure = cellwise(fields.pressure), von_mises = cellwise(fields.von_mises);
+    const auto energy = cellwise(fields.energy);
+    std::vector<Vector<double>> components;
+    for (Eigen::Index k = 0; k < (dim == 2 ? 4 : 6); ++k)
+      components.push_back(cellwise(fields.stress.row(k)));
     const std::vector interpretation(dim, DataComponentInterpretation::component_is_part_of_vector);
     DataOut<dim> data;
     data.add_data_vector(vectors, displacement, std::vector<std::string>(dim, "displacement_m"),
@@ -61,6 +65,11 @@ template <int dim> struct OutputVtk<dim>::Impl {
                          interpretation);
     data.add_data_vector(pressure, "pressure_pa", DataOut<dim>::type_cell_data);
     data.add_data_vector(von_mises, "von_mises_stress_pa", DataOut<dim>::type_cell_data);
+    data.add_data_vector(energy, "strain_energy_j", DataOut<dim>::type_cell_data);
+    constexpr const char *names[] = {"xx", "yy", "zz", "xy", "xz", "yz"};
+    for (std::size_t k = 0; k < components.size(); ++k)
+      data.add_data_vector(components[k], fmt::format("stress_{}_pa", names[k]),
+                           DataOut<dim>::type_cell_data);
     data.build_patches(MappingQEulerian<dim>(degree, vectors, displacement), degree,
                        DataOut<dim>::curved_inner_cells);
     data.write_vtu(out);

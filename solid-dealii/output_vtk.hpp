@@ -16,6 +16,8 @@ struct OutputFields {
   const Eigen::VectorXd &velocity;     ///< [m/s]
   const Eigen::VectorXd &pressure;     ///< [Pa] mean Cauchy pressure of a cell
   const Eigen::VectorXd &von_mises;    ///< [Pa] of the mean Cauchy stress of a cell
+  const Eigen::MatrixXd &stress;       ///< [Pa] that stress, rows xx yy zz xy xz yz
+  const Eigen::VectorXd &energy;       ///< [J] strain energy of a cell
 };
 
 template <int dim> class OutputVtk {

@@ -10,7 +10,7 @@
 namespace {
 
 struct Options {
-  std::string case_file, out = "out", task;
+  std::string case_file, out = "out", task, restart;
   std::vector<std::string> overrides;
   sluice::solid::Hydrostatic water{1000, 9.81, 0.14};
   bool check_only = false;
@@ -19,19 +19,20 @@ struct Options {
 template <int dim> void print_check(const sluice::solid::SolidParams &params) {
   const sluice::solid::SolidSolver<dim> solver(params);
   fmt::print("solid: {} {} elements, {} unknowns\n", solver.discretisation().n_cells(),
-             params.element, solver.assembly().n_free());
+             params.used_element(), solver.assembly().n_free());
 }
 
 void run(const Options &options) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
-  config.allow_tables({"case", "bridge", "fluid", "fluid.wall", "fluid.gauge", "solid"});
+  config.allow_tables({"case", "parameters", "bridge", "fluid", "fluid.rheology", "fluid.wall",
+                       "fluid.gauge", "fluid.probe", "solid", "solid.boundary", "solid.probe"});
   if (options.check_only) {
-    const auto params = config.read<solid::SolidParams>("solid");
+    const auto params = solid::read_params(config);
     return params.dimension == 2 ? print_check<2>(params) : print_check<3>(params);
   }
   if (!options.task.empty())
-    return solid::run_alone(options.task, config, options.water, options.out);
+    return solid::run_alone(options.task, config, options.water, options.out, options.restart);
   std::filesystem::create_directories(options.out);
   solid::run(config, options.out);
 }
@@ -47,7 +48,9 @@ int main(int argc, char **argv) {
   app.add_option("--out", options.out, "folder for all output")->capture_default_str();
   app.add_flag("--check", options.check_only, "read everything, build the mesh, stop");
   app.add_option("--alone", options.task,
-                 "without a partner, under still water: static, modes or release");
+                 "without a partner, under its own load or still water: static, modes or release");
+  app.add_option("--restart", options.restart,
+                 "with --alone release: go on from this solid_state.h5");
   app.add_option("--water-level", options.water.level, "[m] of that water")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <numbers>
+#include <optional>
 
 namespace sluice::solid {
 namespace {
@@ -21,17 +22,15 @@ template <int dim> Box<dim> box_of(const SolidParams &p) {
             {}};
 }
 
-// The clamped side is held fully; the planes near and far hold their normal component (symmetry).
-template <int dim> std::vector<bool> fixed_components(const Discretisation<dim> &d, Side clamped) {
-  std::vector<bool> fixed(static_cast<std::size_t>(d.n_dofs()), false);
-  for (const int node : d.side_nodes(clamped))
-    for (int c = 0; c < dim; ++c)
-      fixed[static_cast<std::size_t>(dim * node + c)] = true;
-  if constexpr (dim == 3)
-    for (const Side side : {Side::near, Side::far})
-      for (const int node : d.side_nodes(side))
-        fixed[static_cast<std::size_t>(dim * node + 2)] = true;
-  return fixed;
+template <int dim> Discretisation<dim> discretise(const SolidParams &p) {
+  const ElementKind kind = element_kind(p.used_element());
+  return p.mesh.empty() ? discretise(box_of<dim>(p), kind)
+                        : discretise<dim>(read_mesh(p.mesh, dim), kind);
+}
+
+Material material_of(const SolidParams &p) {
+  return make_material(p.material, p.constants(),
+                       p.plane == "stress" ? Plane::stress : Plane::strain);
 }
 
 } // namespace
@@ -50,23 +49,31 @@ Side opposite(Side side) { return static_cast<Side>(static_cast<int>(side) ^ 1);
 
 template <int dim>
 SolidSolver<dim>::SolidSolver(const SolidParams &params)
-    : params_(params),
-      discretisation_(discretise(box_of<dim>(params), element_kind(params.element))),
-      assembly_(discretisation_,
-                make_material(params.material, params.youngs_modulus, params.poisson_ratio),
-                params.density, fixed_components(discretisation_, clamped_side())),
-      newton_(assembly_, {params.newton_tolerance, params.newton_max_iterations}),
+    : params_(params), discretisation_(discretise<dim>(params)),
+      supports_(supports_of(discretisation_, params)),
+      own_load_(sluice::solid::own_load(discretisation_, params)),
+      assembly_(discretisation_, material_of(params), params.density, supports_.fixed),
+      newton_(assembly_,
+              {params.newton_tolerance, params.newton_max_iterations, params.tangent_reuse},
+              linear_solver_kind(params.linear_solver)),
       integrator_(params.spectral_radius) {}
 
 template <int dim> SolidState SolidSolver<dim>::initial_state() const {
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(discretisation_.n_dofs());
-  return {zero, zero, zero, Eigen::VectorXd::Zero(discretisation_.n_modes())};
+  const auto &d = discretisation_;
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(d.n_dofs());
+  SolidState state{zero, zero, zero, Eigen::VectorXd::Zero(d.n_modes()), {}};
+  if (params_.viscosity.has_branch())
+    state.branch.setZero(voigt_size<dim> * static_cast<Eigen::Index>(d.weights.size()));
+  return state;
 }
 
 template <int dim>
-NewtonReport SolidSolver<dim>::solve(const Equation &equation, Iterate &iterate) {
-  const NewtonReport report = newton_.solve(equation, iterate);
+NewtonReport SolidSolver<dim>::solve(const Equation &equation, Iterate &iterate,
+                                     const Overstress<dim> &overstress) {
+  const NewtonReport report = newton_.solve(equation, iterate, overstress);
   counts_.iterations += report.iterations;
+  counts_.factorisations += report.factorisations;
+  counts_.linear_iterations += report.linear_iterations;
   if (report.has_converged) {
     ++counts_.solves;
     counts_.iterations_max = std::max(counts_.iterations_max, report.iterations);
@@ -81,8 +88,17 @@ SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd
   check(load.allFinite(), "solid: a nodal force is not finite in step {}", start.step + 1);
   const Stopwatch watch;
   const double cpu_start = process_cpu_time();
+  const Viscosity &viscosity = params_.viscosity;
+  const Eigen::VectorXd total = load + own_load_;
+  std::optional<StepOverstress> viscous;
+  if (viscosity.has_stress())
+    viscous.emplace(viscosity, assembly_.relaxing_stresses(start.displacement, start.modes),
+                    start.branch, dt, 1 - integrator_.alpha_f);
   const Equation equation = integrator_.equation(
-      start, assembly_.internal_force(start.displacement, start.modes), load, dt);
+      start,
+      assembly_.internal_force(start.displacement, start.modes,
+                               viscous ? viscous->at_start<dim>() : Overstress<dim>{}),
+      total, dt, viscosity.mass_rate);
   // The constant-acceleration predictor can invert an element where the load is rough; the
   // displacement of the last step cannot.
   std::vector<Iterate> starts;
@@ -92,18 +108,46 @@ SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd
   starts.push_back({start.displacement, start.modes});
   NewtonReport report;
   for (Iterate &iterate : starts) {
-    report = solve(equation, iterate);
+    report = solve(equation, iterate, viscous ? viscous->at_end<dim>() : Overstress<dim>{});
     if (!report.has_converged)
       continue;
     SolidState end = integrator_.finish(start, iterate, dt);
-    end.load_work += load.dot(end.displacement - start.displacement);
+    end.load_work += total.dot(end.displacement - start.displacement);
+    if (viscous)
+      end.branch = viscous->branch_at_end(assembly_.relaxing_stresses(end.displacement, end.modes));
     counts_.seconds += watch.seconds();
     counts_.cpu_seconds += process_cpu_time() - cpu_start;
     return end;
   }
-  fail("solid: step {} of {:.3g} s has no solution: {}; the largest nodal force is {:.3g} N. "
-       "Take a smaller case.time_step_s, or look at the loads",
-       start.step + 1, dt, report.failure, load.size() ? load.cwiseAbs().maxCoeff() : 0.0);
+  throw NoSolution(fmt::format(
+      "solid: step {} of {:.3g} s has no solution: {}; the largest nodal force is {:.3g} N. "
+      "Take a smaller case.time_step_s, or look at the loads",
+      start.step + 1, dt, report.failure, load.size() ? load.cwiseAbs().maxCoeff() : 0.0));
+}
+
+template <int dim>
+SolidState SolidSolver<dim>::advance(const SolidState &start, const Eigen::VectorXd &load,
+                                     double window, const SolidState *guess) {
+  SolidState state = start;
+  const int n = params_.steps_per_window;
+  for (int k = 0; k < n; ++k) // a guess is one for the end of the window
+    state =
+        advance_halving(state, load, window / n, n == 1 ? guess : nullptr, params_.max_step_cuts);
+  return state;
+}
+
+template <int dim>
+SolidState SolidSolver<dim>::advance_halving(const SolidState &start, const Eigen::VectorXd &load,
+                                             double dt, const SolidState *guess, int cuts_left) {
+  try {
+    return step(start, load, dt, guess);
+  } catch (const NoSolution &) {
+    if (cuts_left == 0)
+      throw;
+  }
+  ++counts_.cut_steps;
+  const SolidState middle = advance_halving(start, load, 0.5 * dt, nullptr, cuts_left - 1);
+  return advance_halving(middle, load, 0.5 * dt, nullptr, cuts_left - 1);
 }
 
 // From equilibrium under no load to equilibrium under all of it; parts are halved and doubled.
@@ -120,9 +164,10 @@ void SolidSolver<dim>::raise_load(const Eigen::VectorXd &load, Iterate &iterate)
       part *= 2;
     } else {
       part /= 2;
-      check(part > 1e-4,
+      if (part <= 1e-4)
+        throw NoSolution(fmt::format(
             "solid: no equilibrium beyond {:.4g} of the load (largest nodal force {:.3g} N): {}",
-            reached, load.cwiseAbs().maxCoeff(), report.failure);
+            reached, load.cwiseAbs().maxCoeff(), report.failure));
     }
   }
 }
@@ -130,7 +175,7 @@ void SolidSolver<dim>::raise_load(const Eigen::VectorXd &load, Iterate &iterate)
 template <int dim> SolidState SolidSolver<dim>::solve_static(const Eigen::VectorXd &load) {
   SolidState state = initial_state();
   Iterate iterate{state.displacement, state.modes};
-  raise_load(load, iterate);
+  raise_load(load + own_load_, iterate);
   state.displacement = iterate.displacement;
   state.modes = iterate.modes;
   return state;
@@ -139,31 +184,48 @@ template <int dim> SolidState SolidSolver<dim>::solve_static(const Eigen::Vector
 // The load follows by repeated solution under the load of the last shape, which needs no load
 // stiffness; the part of it that is left out makes the convergence linear.
 template <int dim>
-SolidState SolidSolver<dim>::solve_static_follower(Side side, const Hydrostatic &pressure) {
+SolidState SolidSolver<dim>::solve_static_follower(
+    const std::function<Eigen::VectorXd(const Eigen::VectorXd &)> &load_at) {
   constexpr int max_rounds = 100;
   SolidState state = initial_state();
-  Eigen::VectorXd load = pressure_forces(discretisation_, side, pressure, state.displacement);
+  Eigen::VectorXd load = load_at(state.displacement);
   for (int round = 0; round < max_rounds; ++round) {
     state = solve_static(load);
-    const Eigen::VectorXd next =
-        pressure_forces(discretisation_, side, pressure, state.displacement);
+    const Eigen::VectorXd next = load_at(state.displacement);
     const double change = (next - load).norm();
     load = next;
     if (change <= 1e-10 * load.norm())
       return state;
   }
-  fail("solid: the follower load did not settle in {} rounds", max_rounds);
+  throw NoSolution(fmt::format("solid: the follower load did not settle in {} rounds", max_rounds));
+}
+
+template <int dim>
+SolidState SolidSolver<dim>::solve_static_follower(Side side, const Hydrostatic &pressure) {
+  return solve_static_follower([&](const Eigen::VectorXd &displacement) {
+    return pressure_forces(discretisation_, side, pressure, displacement);
+  });
+}
+
+template <int dim>
+Eigen::VectorXd SolidSolver<dim>::reactions(const SolidState &state,
+                                            const Eigen::VectorXd &load) const {
+  return assembly_.internal_force(state.displacement, state.modes,
+                                  Overstress<dim>{0, numbers(state.branch)}) +
+         assembly_.mass_times(state.acceleration) - load - own_load_;
 }
 
 template <int dim>
 Eigen::VectorXd SolidSolver<dim>::consistent_acceleration(const SolidState &state,
                                                           const Eigen::VectorXd &load) {
-  LinearSolver mass(assembly_.mass());
+  LinearSolver mass(assembly_.mass(), linear_solver_kind(params_.linear_solver),
+                    [this] { return assembly_.rigid_motions(); });
   mass.factorise(assembly_.mass());
   Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(load.size());
-  assembly_.add_to_free(acceleration, 1,
-                        mass.solve(assembly_.restrict_to_free(
-                            load - assembly_.internal_force(state.displacement, state.modes))));
+  assembly_.add_to_free(
+      acceleration, 1,
+      mass.solve(assembly_.restrict_to_free(
+          load + own_load_ - assembly_.internal_force(state.displacement, state.modes))));
   return acceleration;
 }
 

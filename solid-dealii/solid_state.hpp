@@ -13,6 +13,7 @@ struct SolidState {
   Eigen::VectorXd velocity;     ///< [m/s]
   Eigen::VectorXd acceleration; ///< [m/s^2]
   Eigen::VectorXd modes;        ///< [m] internal modes, dim components per mode, cell by cell
+  Eigen::VectorXd branch;       ///< [Pa] viscous stress [cell][point][component]; empty without
   long step = 0;                ///< steps taken since the start
   double load_work = 0;         ///< [J] done by the loads since the start (2-D: per metre)
 };

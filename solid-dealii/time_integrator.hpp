@@ -32,12 +32,18 @@ public:
     return s.displacement + dt * s.velocity + 0.5 * dt * dt * s.acceleration;
   }
 
-  /// The step as an equation for u1. `internal_force` is f_int(u0) [N].
+  /// The step as an equation for u1. `internal_force` is f_int(u0) [N]; `mass_rate` [1/s] adds
+  /// mass_rate M [(1 - af) v1 + af v0], in which v1 is linear in u1.
   Equation equation(const SolidState &s, const Eigen::VectorXd &internal_force,
-                    const Eigen::VectorXd &load, double dt) const {
-    const double mass_factor = (1 - alpha_m) / (beta * dt * dt);
-    return {1 - alpha_f, mass_factor, unaccelerated(s, dt) - alpha_m / mass_factor * s.acceleration,
-            load - alpha_f * internal_force};
+                    const Eigen::VectorXd &load, double dt, double mass_rate = 0) const {
+    const double inertia = (1 - alpha_m) / (beta * dt * dt);
+    const double damping = mass_rate * (1 - alpha_f) * gamma / (beta * dt);
+    const Eigen::VectorXd coasting = s.velocity + dt * (1 - gamma) * s.acceleration; // v1 - g dt a1
+    const Eigen::VectorXd reference =
+        unaccelerated(s, dt) -
+        (alpha_m * s.acceleration + mass_rate * ((1 - alpha_f) * coasting + alpha_f * s.velocity)) /
+            (inertia + damping);
+    return {1 - alpha_f, inertia + damping, reference, load - alpha_f * internal_force};
   }
 
   /// The state at the end of the step from its displacement and modes.

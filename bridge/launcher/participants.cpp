@@ -15,15 +15,31 @@ namespace fs = std::filesystem;
 
 namespace {
 
-struct Kind {
+/// A participant's table and the program that plays it unless the table names another.
+struct Role {
   std::string_view table;
   std::string_view program;
-  std::string_view build_folder; ///< where the build puts it, relative to the build's root
 };
 
 // The first one listed shows its progress on the terminal.
-constexpr std::array kinds{Kind{"fluid", "sluice-fluid", "fluid"},
-                           Kind{"solid", "sluice-solid", "solid-dealii"}};
+constexpr std::array roles{Role{"fluid", "sluice-fluid"}, Role{"solid", "sluice-solid"}};
+
+// Where the build puts programs, relative to its root.
+constexpr std::array build_folders{"fluid", "solid-dealii", "bridge/calculix"};
+
+struct ProgramChoice {
+  std::string program;
+  template <class Reader> void describe(Reader &read) {
+    read("program", program, "which program plays this participant")
+        .check(program.find('/') == std::string::npos,
+               "must be a name; --programs gives the folder");
+  }
+};
+
+std::string program_of(const Role &role, const Config &config) {
+  const std::string chosen = config.peek<ProgramChoice>(role.table).program;
+  return chosen.empty() ? std::string(role.program) : chosen;
+}
 
 // The fluid's own rule for having a partner: a coupled wall, and walls that move.
 struct FluidWalls {
@@ -39,9 +55,13 @@ struct Wall {
   }
 };
 
+bool walls_are_held(const Config &config) {
+  return config.peek<FluidWalls>("fluid").coupled_walls != "move";
+}
+
 bool fluid_has_partner(const Config &config) {
   const auto walls = config.peek_all<Wall>("fluid.wall");
-  return config.peek<FluidWalls>("fluid").coupled_walls == "move" &&
+  return !walls_are_held(config) &&
          std::any_of(walls.begin(), walls.end(), [](const Wall &wall) { return wall.coupled; });
 }
 
@@ -53,25 +73,28 @@ fs::path own_folder() {
   return self.parent_path();
 }
 
-std::vector<fs::path> folders_to_search(const Kind &kind, const fs::path &given) {
+std::vector<fs::path> folders_to_search(const fs::path &given) {
   if (!given.empty())
     return {fs::absolute(given)};
   const fs::path own = own_folder();
+  std::vector<fs::path> folders{own};
   // <build>/bridge/launcher/sluice, when it runs from the build tree
-  return {own, own.parent_path().parent_path() / kind.build_folder};
+  for (const fs::path folder : build_folders)
+    folders.push_back(own.parent_path().parent_path() / folder);
+  return folders;
 }
 
-fs::path find_program(const Kind &kind, const fs::path &given) {
+fs::path find_program(std::string_view table, const std::string &program, const fs::path &given) {
   std::vector<std::string> tried;
-  for (const fs::path &folder : folders_to_search(kind, given)) {
-    const fs::path candidate = folder / kind.program;
+  for (const fs::path &folder : folders_to_search(given)) {
+    const fs::path candidate = folder / program;
     if (access(candidate.c_str(), X_OK) == 0 && fs::is_regular_file(candidate))
       return candidate;
-    tried.push_back(candidate.string());
+    tried.push_back(folder.string());
   }
-  fail("[{}] needs the program {}, which is not there (looked for {}); build it "
+  fail("[{}] needs the program {}, which is not there (looked in {}); build it "
        "(CMake's summary says what was skipped and why) or give its folder with --programs",
-       kind.table, kind.program, fmt::join(tried, " and "));
+       table, program, fmt::join(tried, ", "));
 }
 
 } // namespace
@@ -92,10 +115,19 @@ std::vector<Participant> participants_of(const Config &config, const fs::path &f
         "run sluice-solid --alone",
         config.file_name());
   const bool is_coupled = fluid_has_partner(config);
+  check(!is_coupled || config.has_table("solid"),
+        "{}: a wall is coupled, but there is no [solid] table; give it one, or hold the walls with "
+        "fluid.coupled_walls = \"stay\"",
+        config.file_name());
+  check(is_coupled || !config.has_table("solid") || walls_are_held(config),
+        "{}: there is a [solid] table, but no [[fluid.wall]] has coupled = true: nothing would move "
+        "with it",
+        config.file_name());
   std::vector<Participant> found;
-  for (const Kind &kind : kinds)
-    if (config.has_table(kind.table) && (kind.table == "fluid" || is_coupled))
-      found.push_back({std::string(kind.table), find_program(kind, folder)});
+  for (const Role &role : roles)
+    if (config.has_table(role.table) && (role.table == "fluid" || is_coupled))
+      found.push_back(
+          {std::string(role.table), find_program(role.table, program_of(role, config), folder)});
   return found;
 }
 

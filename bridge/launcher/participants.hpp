@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Which programs a case needs. The tables of the case file decide: [fluid] starts sluice-fluid,
-// [solid] starts sluice-solid where the fluid has a wall that it moves.
+// [solid] starts sluice-solid where the fluid has a wall that it moves; the key `program` in a
+// table names another one, such as "sluice-calculix".
 #pragma once
 
 #include "bridge/base/config.hpp"

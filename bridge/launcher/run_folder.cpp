@@ -31,7 +31,7 @@ bool belongs_to_a_run(const std::string &file) {
       R"((fluid|wall|solid)_\d+\.(vtp|vtu))"
       R"(|(fluid|wall|solid)\.(log|pvd|pvd\.part)|summary\.(json|md)|(fluid|solid)_summary\.json)"
       R"(|(tip|fluid|coupling|balance|solid_energy|solid_loads|fluid_loads)\.csv)"
-      R"(|(tip|levels|strip|energy)\.png|case\.toml)");
+      R"(|probe_[\w-]+\.csv|(tip|levels|strip|energy|profiles|streamlines)\.png|case\.toml)");
   return std::regex_match(file, names);
 }
 
@@ -63,6 +63,11 @@ void check_is_ours(const fs::path &folder, const std::string &name, const fs::pa
         "{}: has the name of a run's file, but no run has made this folder; it would be deleted: "
         "move it away or give another --out folder",
         files.empty() ? "" : files.front().string());
+  for (const auto &entry : fs::directory_iterator(folder))
+    check(fs::equivalent(entry.path(), case_file),
+          "{}: holds files that no run has made ('{}'), and a run's would lie among them; give a "
+          "new folder as --out",
+          folder.string(), entry.path().filename().string());
 }
 
 void copy_case(const fs::path &from, const fs::path &to) {

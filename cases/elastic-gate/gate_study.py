@@ -83,6 +83,7 @@ class Outcome:
     energy_gain_before_opening: float = None
     energy_gain_after_opening: float = None
     volume_drift_max: float = None
+    cpu_time_s: float = None  # of fluid and solid; hardly depends on what else the machine does
 
 
 def stability_settings(spacing, end, steps):
@@ -170,6 +171,7 @@ def read_outcome(setting, folder, stopped_by, known):
         iterations_mean=s.get("coupling_iterations_mean"),
         iterations_max=s.get("coupling_iterations_max"), failed_windows=s.get("failed_windows"),
         lost_points=s.get("lost_points"), volume_drift_max=s.get("volume_drift_max"),
+        cpu_time_s=s.get("cpu_time_s"),
         **tip, **fluid_values(run))
 
 
@@ -226,7 +228,7 @@ def result(outcome):
 
 COMMON_HEADER = ["iterations mean (max)", "peak x mm", "at s", "then min mm", "x at 0.06 s mm",
                  "outflow to 0.08 s mm2", "energy gain %, before / after opening",
-                 "failed windows / lost points", "run time s"]
+                 "failed windows / lost points", "run time s", "CPU time s"]
 
 
 def common_cells(o):
@@ -238,7 +240,7 @@ def common_cells(o):
     return [iterations, shown(o.peak_ux_m, 1e3), shown(o.peak_ux_time_s, 1, 3),
             shown(o.min_ux_after_peak_m, 1e3), shown(o.ux_early_m, 1e3, 2),
             shown(o.outflow_past_tip_m2, 1e6, 0), " / ".join(gains), " / ".join(counts),
-            shown(o.wall_time_s)]
+            shown(o.wall_time_s), shown(o.cpu_time_s)]
 
 
 def stability_table(outcomes):

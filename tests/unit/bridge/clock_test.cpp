@@ -55,6 +55,68 @@ TEST(WindowClock, sub_steps_add_up_to_the_window) {
   EXPECT_TRUE(clock.step(0.1 / 7));
 }
 
+// Doubles that are summed would lose or gain a step here within some thousand windows.
+TEST(WindowClock,
+     a_million_windows_of_an_irrational_step_ratio_lose_no_step_and_make_no_empty_one) {
+  const double step = 1 / (1e3 * std::sqrt(2.0)), own_step = step / std::sqrt(5.0);
+  WindowClock clock(times(1e6 * step + 0.3 * step, step));
+  long windows = 0, steps = 0;
+  double shortest = step;
+  while (!clock.is_over()) {
+    ++windows;
+    bool is_complete = false;
+    while (!is_complete) {
+      const double dt = std::min(own_step, clock.left());
+      shortest = std::min(shortest, dt);
+      is_complete = clock.step(dt);
+      ++steps;
+    }
+    clock.next_window();
+  }
+  EXPECT_EQ(windows, 1'000'001);
+  EXPECT_EQ(steps, 3 * 1'000'000 + 1); // sqrt(5) own steps in a window, 0.67 in the last
+  EXPECT_GE(shortest, (1 - 2 / std::sqrt(5.0)) * step * (1 - 1e-9));
+  EXPECT_EQ(clock.time(), 1e6 * step + 0.3 * step);
+}
+
+TEST(WindowClock, a_halved_window_grows_again_where_a_whole_one_would_start) {
+  WindowClock clock(times(1.0, 0.25), 2, 2);
+  clock.next_window();
+  EXPECT_TRUE(clock.can_halve());
+  EXPECT_EQ(clock.halved_length(), 0.125);
+  clock.halve();
+  clock.halve();
+  EXPECT_FALSE(clock.can_halve());
+  std::vector<double> lengths, starts;
+  for (; !clock.is_over(); clock.next_window()) {
+    starts.push_back(clock.start());
+    lengths.push_back(clock.window_length());
+    if (!clock.is_last()) {
+      WindowClock next = clock;
+      next.next_window();
+      EXPECT_EQ(clock.next_window_length(), next.window_length());
+    }
+  }
+  EXPECT_EQ(lengths, (std::vector<double>{0.0625, 0.0625, 0.125, 0.125, 0.125, 0.25}));
+  EXPECT_EQ(starts, (std::vector<double>{0.25, 0.3125, 0.375, 0.5, 0.625, 0.75}));
+  EXPECT_EQ(clock.time(), 1.0);
+}
+
+TEST(WindowClock, the_short_last_window_is_halved_too) {
+  WindowClock clock(times(1.1, 0.5), 1);
+  clock.next_window();
+  clock.next_window();
+  EXPECT_NEAR(clock.window_length(), 0.1, 1e-15);
+  clock.halve();
+  EXPECT_FALSE(clock.is_last());
+  EXPECT_NEAR(clock.window_length(), 0.05, 1e-15);
+  clock.next_window();
+  EXPECT_TRUE(clock.is_last());
+  EXPECT_NEAR(clock.start(), 1.05, 1e-15);
+  clock.next_window();
+  EXPECT_EQ(clock.time(), 1.1);
+}
+
 // A solid that takes two steps in a window sees the force at each and exchanges once.
 TEST(Participant, sub_steps_read_linearly_in_time_and_exchange_at_the_end_of_the_window) {
   const TemporaryFolder folder;

@@ -101,20 +101,27 @@ TEST_P(EitherSide, a_partner_that_never_starts_is_named_with_the_address) {
 }
 
 TEST_P(EitherSide, a_partner_that_dies_without_a_word_is_noticed_at_once) {
-  const auto [error, seconds] =
-      survive(self(), Piston(), in_window_five([](auto &) { ::_exit(3); }));
-  expect_message(error, {"the " + other() + " ended without a word", "the " + self() + " awaited",
-                         "iteration 1 of window 5", "t = 0.004"});
-  EXPECT_LT(seconds, 3);
+  for (const char *transport : {"unix", "tcp", "shared"}) {
+    Piston piston;
+    piston.bridge_keys = fmt::format("transport = \"{}\"\n", transport);
+    const auto [error, seconds] =
+        survive(self(), piston, in_window_five([](auto &) { ::_exit(3); }));
+    expect_message(error, {"the " + other() + " ended without a word", "the " + self() + " awaited",
+                           "iteration 1 of window 5", "t = 0.004"});
+    EXPECT_LT(seconds, 3) << transport;
+  }
 }
 
 TEST_P(EitherSide, a_partner_that_stops_breathing_is_given_up_after_the_silence_deadline) {
-  Piston piston;
-  piston.silence_deadline = 0.8;
-  const auto [error, seconds] =
-      survive(self(), piston, in_window_five([](auto &) { ::raise(SIGSTOP); }));
-  expect_message(error, {"the " + other() + " was silent for 0.8 s", "awaited", "window 5"});
-  EXPECT_LT(seconds, 3);
+  for (const char *transport : {"unix", "shared"}) {
+    Piston piston;
+    piston.silence_deadline = 0.8;
+    piston.bridge_keys = fmt::format("transport = \"{}\"\n", transport);
+    const auto [error, seconds] =
+        survive(self(), piston, in_window_five([](auto &) { ::raise(SIGSTOP); }));
+    expect_message(error, {"the " + other() + " was silent for 0.8 s", "awaited", "window 5"});
+    EXPECT_LT(seconds, 3) << transport;
+  }
 }
 
 TEST_P(EitherSide, a_long_step_is_not_a_dead_partner) {
@@ -425,6 +432,50 @@ TEST(Misuse, a_step_or_a_reading_time_beyond_the_window_is_refused) {
         bridge.advance(2e-3);
       });
   expect_message(outcome.solid_error, {"the fluid gave up", "outside the window"});
+}
+
+// ---- shared memory ------------------------------------------------------------------------------
+
+TEST(SharedMemory, carries_more_than_its_ring_holds_in_order_and_leaves_no_file) {
+  const TemporaryFolder folder;
+  const Address address{Address::Family::shared_memory, folder.path() / "s.sock", "", ""};
+  Bytes sent(9'000'000);
+  for (std::size_t k = 0; k < sent.size(); ++k)
+    sent[k] = static_cast<std::byte>((k * k + k / 251) % 256);
+  {
+    Listener listener(address, "");
+    std::thread writer([&] {
+      const auto there = try_connect(address, deadline_in(5));
+      for (std::span<const std::byte> rest(sent); !rest.empty();)
+        rest = rest.subspan(there->write_some(rest, deadline_in(5)));
+    });
+    const auto here = listener.accept(deadline_in(5));
+    ASSERT_NE(here, nullptr);
+    Bytes received(sent.size());
+    for (std::span<std::byte> rest(received); !rest.empty();)
+      rest = rest.subspan(here->read_some(rest, deadline_in(5)));
+    writer.join();
+    EXPECT_TRUE(received == sent);
+    std::byte more;
+    EXPECT_THROW(here->read_some(std::span(&more, 1), deadline_in(5)), ConnectionLost);
+  }
+  EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
+}
+
+TEST(SharedMemory, a_wait_ends_at_its_deadline) {
+  const TemporaryFolder folder;
+  const Address address{Address::Family::shared_memory, folder.path() / "s.sock", "", ""};
+  Listener listener(address, "");
+  std::unique_ptr<Transport> there;
+  std::thread connector([&] { there = try_connect(address, deadline_in(5)); });
+  const auto here = listener.accept(deadline_in(5));
+  connector.join();
+  ASSERT_TRUE(here && there);
+  std::byte byte{};
+  const Stopwatch watch;
+  EXPECT_EQ(here->read_some(std::span(&byte, 1), deadline_in(0.2)), 0u);
+  EXPECT_GE(watch.seconds(), 0.2);
+  EXPECT_LT(watch.seconds(), 2);
 }
 
 } // namespace

@@ -42,6 +42,8 @@ TEST(Participant, the_transports_and_the_start_order_give_the_same_bits) {
   EXPECT_EQ(run_both(piston, folder.path(), false).history, local.history);
   piston.bridge_keys = "transport = \"tcp\"\n";
   EXPECT_EQ(run_both(piston, folder.path(), false).history, local.history);
+  piston.bridge_keys = "transport = \"shared\"\n";
+  EXPECT_EQ(run_both(piston, folder.path(), false).history, local.history);
 }
 
 TEST(Participant, aitken_follows_the_closed_form) {
@@ -162,6 +164,111 @@ TEST(Participant, no_socket_file_is_left_behind_and_a_stale_one_is_no_obstacle) 
     EXPECT_EQ(outcome.fluid_error + outcome.solid_error, "");
     EXPECT_FALSE(std::filesystem::exists(folder.path() / "bridge.sock"));
   }
+}
+
+// ---- windows that fail -------------------------------------------------------------------------
+
+// In window 5 whatever is longer than a quarter of a window cannot be computed.
+Event fails_in_window_5(const Piston &piston) {
+  return [length = piston.time_step](Participant &bridge, std::vector<double> &) {
+    const bool is_there = bridge.time() >= 4 * length * (1 - 1e-9) && bridge.time() < 5 * length;
+    if (is_there && bridge.max_time_step_size() > 0.3 * length)
+      bridge.report_failure("an element turned inside out");
+  };
+}
+
+Piston halving(const std::string &keys = "") {
+  Piston piston;
+  piston.windows = 20;
+  piston.bridge_keys = "max_halvings = 2\nwindows_to_grow = 2\n" + keys;
+  return piston;
+}
+
+// To the tolerance of a window's increment, as above; shorter steps in one window of twenty change
+// less than that.
+void expect_close_to_exact(const Outcome &outcome, const Piston &piston) {
+  ASSERT_EQ(outcome.solid_error, "");
+  ASSERT_EQ(outcome.fluid_error, "");
+  EXPECT_NEAR(outcome.history.back(), piston.exact(piston.windows), 1e-3 * piston.start);
+}
+
+TEST(FailedWindow, is_halved_on_both_sides_whichever_reports_it_and_the_length_grows_back) {
+  for (const char *scheme : {"serial-implicit", "parallel-implicit"})
+    for (const bool is_fluid : {true, false}) {
+      const TemporaryFolder folder;
+      const Piston piston = halving(fmt::format("scheme = \"{}\"\n", scheme));
+      const Event event = fails_in_window_5(piston);
+      const Outcome outcome = run_both(piston, folder.path(), true, is_fluid ? event : Event(),
+                                       is_fluid ? Event() : event);
+      expect_close_to_exact(outcome, piston);
+      EXPECT_EQ(outcome.history.size(), 18u + 4 + 2) << "four quarters, of which the third was "
+                                                        "tried as a half, two halves, then whole";
+      for (const Statistics &statistics : {outcome.fluid, outcome.solid}) {
+        EXPECT_EQ(statistics.halved_windows, 3) << scheme;
+        EXPECT_EQ(statistics.windows, 24);
+        EXPECT_EQ(statistics.failed_windows, 0);
+      }
+    }
+}
+
+TEST(FailedWindow, a_value_that_is_not_finite_is_such_a_failure) {
+  const TemporaryFolder folder;
+  const Piston piston = halving();
+  const Event event = [&](Participant &bridge, std::vector<double> &values) {
+    if (bridge.time_window() == 3 && bridge.max_time_step_size() > 0.6 * piston.time_step)
+      values[0] = std::nan("");
+  };
+  const Outcome outcome = run_both(piston, folder.path(), true, event);
+  expect_close_to_exact(outcome, piston);
+  EXPECT_EQ(outcome.solid.halved_windows, 1);
+}
+
+TEST(FailedWindow, so_is_one_that_does_not_converge) {
+  const TemporaryFolder folder;
+  Piston piston = halving("acceleration = \"constant\"\ninitial_relaxation = 1\n"
+                          "max_iterations = 10\n");
+  piston.added_mass = 1.001; // diverges at any step
+  const Outcome outcome = run_both(piston, folder.path(), true);
+  EXPECT_TRUE(contains(outcome.solid_error, "did not converge in 10 iterations"));
+  EXPECT_TRUE(contains(outcome.solid_error, "halved 2 times already")) << outcome.solid_error;
+  EXPECT_TRUE(contains(outcome.fluid_error, "halved 2 times already")) << outcome.fluid_error;
+}
+
+TEST(FailedWindow, that_cannot_be_halved_any_more_ends_both_programs_with_the_reason) {
+  for (const bool is_fluid : {true, false}) {
+    const TemporaryFolder folder;
+    const Piston piston = halving();
+    const Event event = [](Participant &bridge, std::vector<double> &) {
+      if (bridge.time_window() == 3)
+        bridge.report_failure("a point was lost");
+    };
+    const Outcome outcome = run_both(piston, folder.path(), true, is_fluid ? event : Event(),
+                                     is_fluid ? Event() : event);
+    for (const std::string &error : {outcome.fluid_error, outcome.solid_error})
+      EXPECT_TRUE(contains(error, fmt::format("could not be computed by the {}: a point was lost",
+                                              is_fluid ? "fluid" : "solid")))
+          << error;
+  }
+}
+
+TEST(FailedWindow, ends_the_run_where_halving_was_not_asked_for) {
+  const TemporaryFolder folder;
+  const Event event = [](Participant &bridge, std::vector<double> &) {
+    bridge.report_failure("a point was lost");
+  };
+  const Outcome outcome = run_both(Piston(), folder.path(), true, event);
+  EXPECT_TRUE(contains(outcome.fluid_error, "a point was lost")) << outcome.fluid_error;
+  EXPECT_TRUE(contains(outcome.solid_error, "a point was lost")) << outcome.solid_error;
+}
+
+TEST(Participant, the_parallel_scheme_follows_the_closed_form_too) {
+  const TemporaryFolder folder;
+  Piston piston;
+  piston.bridge_keys = "scheme = \"parallel-implicit\"\n";
+  const Outcome outcome = run_both(piston, folder.path(), true);
+  expect_close_to_exact(outcome, piston);
+  fmt::print("  parallel: {:.2f} iterations per window\n", outcome.solid.iterations_mean());
+  EXPECT_LE(outcome.solid.iterations_mean(), 6);
 }
 
 } // namespace

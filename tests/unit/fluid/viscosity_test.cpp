@@ -16,9 +16,11 @@ using testing::FrozenCloud;
 constexpr double nu = 0.01;
 
 void build_rows(const FrozenCloud &frozen, ViscousProblem<2> &problem) {
+  RheologyParams any; // not newtonian: with the gradients
+  any.law = "power-law";
   PressureProblem<2> pressure;
   assemble_pressure_operators(frozen.points, frozen.cloud, {}, pressure);
-  build_viscous_rows(frozen.points, frozen.cloud, pressure, problem);
+  build_viscous_rows(frozen.points, frozen.cloud, Rheology(any, 1), pressure, problem);
 }
 
 std::vector<Vec<2>> diffused(const FrozenCloud &frozen, std::vector<Vec<2>> u, double dt,

@@ -126,17 +126,37 @@ class CompleteRunTest(LauncherTest):
                      "OMPI_ALLOW_RUN_AS_ROOT=1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1"):
             self.assertIn(line, said)
 
+    def test_a_table_may_name_another_program(self):
+        self.program("calculix", WELL.replace("${part}", "solid") + "echo calculix speaks\n")
+        done = self.run_case("--set", "solid.program=sluice-calculix")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("calculix speaks", (self.out / "solid.log").read_text())
+        self.assertEqual(self.summary()["steps"], 3)
+        done = self.run_case("--set", "solid.program=sluice-nobody")
+        self.assertIn("[solid] needs the program sluice-nobody", done.stderr)
+        self.assertIn(str(self.folder), done.stderr)
+        self.assertIn("must be a name", self.run_case("--set", "solid.program=/bin/true").stderr)
+
     def test_case_with_one_participant_starts_that_one_only(self):
-        self.case.write_text(CASE[:CASE.index("[solid]")])
+        self.case.write_text(CASE[:CASE.index("[solid]")].replace("coupled = true\n", ""))
         self.assertEqual(self.run_case().returncode, 0)
         self.assertFalse((self.out / "solid.log").exists())
 
     def test_solid_is_not_started_where_the_fluid_moves_no_wall(self):
         self.assertEqual(self.run_case("--set", "fluid.coupled_walls=stay").returncode, 0)
         self.assertFalse((self.out / "solid.log").exists())
+
+    def test_a_coupled_wall_without_a_solid_and_a_solid_without_one_are_refused(self):
+        self.case.write_text(CASE[:CASE.index("[solid]")])
+        self.assertIn("a wall is coupled, but there is no [solid]", self.run_case().stderr)
         self.case.write_text(CASE.replace("coupled = true\n", ""))
-        self.assertEqual(self.run_case().returncode, 0)
-        self.assertFalse((self.out / "solid.log").exists())
+        self.assertIn("no [[fluid.wall]] has coupled = true", self.run_case().stderr)
+
+    def test_a_folder_with_other_peoples_files_is_refused_untouched(self):
+        self.out.mkdir()
+        (self.out / "thesis.tex").write_text("mine")
+        self.assertIn("holds files that no run has made ('thesis.tex')", self.run_case().stderr)
+        self.assertEqual([path.name for path in self.out.iterdir()], ["thesis.tex"])
 
     def test_token_is_not_shown_in_the_summary(self):
         self.run_case("--set", "bridge.token=sesame")

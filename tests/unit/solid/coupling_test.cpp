@@ -64,8 +64,10 @@ struct Outcome {
   fs::path folder;
 };
 
-template <class Force> Outcome couple(const std::string &name, Force force_of) {
-  const Config config = Config::parse(case_text, "case.toml");
+template <class Force>
+Outcome couple(const std::string &name, Force force_of,
+               const std::vector<std::string> &overrides = {}) {
+  const Config config = Config::parse(case_text, "case.toml", overrides);
   Outcome outcome{"", "", fs::path(testing::TempDir()) / name};
   fs::remove_all(outcome.folder);
   fs::create_directories(outcome.folder);
@@ -139,6 +141,23 @@ TEST(Coupling, under_a_given_force_the_coupled_run_is_the_uncoupled_one) {
   EXPECT_NEAR(energy[3] / state.load_work, 1, 1e-7);
 }
 
+// The same fluid, plane, against a column of hexahedra: the plane solid's answer.
+TEST(Coupling, a_column_of_hexahedra_answers_a_plane_partner_like_the_plane_solid) {
+  const Outcome plane = couple("plane", constant_force);
+  const Outcome deep = couple("deep", constant_force,
+                              {"solid.dimension=3", "solid.interface=plane", "solid.depth_m=0.02",
+                               "solid.elements_deep=2", "case.end_time_s=2e-3"});
+  ASSERT_EQ(deep.solid_error, "");
+  ASSERT_EQ(deep.fluid_error, "");
+  const auto a = read_csv(plane.folder / "tip.csv"), b = read_csv(deep.folder / "tip.csv");
+  ASSERT_EQ(b.size(), 11u);
+  for (std::size_t k = 1; k < b.size(); ++k) // Newton's tolerance, and the map between the meshes
+    EXPECT_NEAR(b[k][1] / a[k][1], 1, 1e-7);
+  const auto loads2 = read_csv(plane.folder / "solid_loads.csv"),
+             loads3 = read_csv(deep.folder / "solid_loads.csv");
+  EXPECT_NEAR(loads3[5][2] / loads2[5][2] / 0.02, 1, 1e-9) << "newtons, and newtons per metre";
+}
+
 TEST(Coupling, a_run_leaves_fields_and_a_summary) {
   const Outcome outcome = couple("summary", constant_force);
   const auto summary = read_json(outcome.folder / "solid_summary.json");
@@ -150,6 +169,7 @@ TEST(Coupling, a_run_leaves_fields_and_a_summary) {
   std::stringstream text;
   text << pvd.rdbuf();
   EXPECT_TRUE(fs::exists(outcome.folder / "solid_0004.vtu")) << "0, 1, 2, 3 and 4 ms";
+  EXPECT_TRUE(fs::exists(outcome.folder / "solid_state.h5"));
   EXPECT_FALSE(fs::exists(outcome.folder / "solid_0005.vtu"));
   EXPECT_NE(text.str().find("solid_0004.vtu"), std::string::npos);
 }
@@ -213,6 +233,45 @@ TEST(Coupling, the_release_alone_ends_at_the_end_time_with_a_shorter_window) {
   const auto tips = read_csv(folder / "tip.csv");
   ASSERT_EQ(tips.size(), 4u) << "at rest, two windows of 2e-4 s and one of 1e-4 s";
   EXPECT_EQ(tips.back()[0], 5e-4);
+}
+
+// 5 ms in one run, or 2 ms, a state file and the rest.
+TEST(Coupling, a_release_that_goes_on_from_its_state_file_ends_with_the_same_bits) {
+  const fs::path whole = fs::path(testing::TempDir()) / "whole",
+                 first = fs::path(testing::TempDir()) / "first",
+                 rest = fs::path(testing::TempDir()) / "rest";
+  for (const auto &folder : {whole, first, rest})
+    fs::remove_all(folder);
+  const auto release = [](const fs::path &folder, const char *end, const fs::path &from) {
+    const std::vector<std::string> overrides{std::string("case.end_time_s=") + end};
+    run_alone("release", Config::parse(case_text, "case.toml", overrides), {1000, 9.81, 0.14},
+              folder, from);
+  };
+  release(whole, "4e-3", "");
+  release(first, "2e-3", "");
+  release(rest, "4e-3", first / "solid_state.h5");
+  const auto a = read_csv(whole / "tip.csv"), b = read_csv(rest / "tip.csv");
+  ASSERT_EQ(b.size(), 11u) << "the state it starts from and ten windows";
+  EXPECT_EQ(b.back(), a.back());
+  EXPECT_EQ(read_csv(whole / "solid_energy.csv").back(),
+            read_csv(rest / "solid_energy.csv").back());
+}
+
+TEST(Coupling, probes_and_reactions_are_recorded) {
+  const fs::path folder = fs::path(testing::TempDir()) / "probes";
+  fs::remove_all(folder);
+  const std::string text = std::string(case_text) + R"(
+[[solid.probe]]
+name = "corner"
+position_m = [0.1, 0]
+)";
+  const std::vector<std::string> end{"case.end_time_s=1e-3"};
+  run_alone("release", Config::parse(text, "case.toml", end), {1000, 9.81, 0.14}, folder);
+  const auto probes = read_csv(folder / "probes.csv"), tips = read_csv(folder / "tip.csv");
+  ASSERT_EQ(probes.size(), tips.size());
+  EXPECT_EQ(probes.back()[1], tips.back()[3]);
+  EXPECT_EQ(probes.back()[2], tips.back()[4]);
+  EXPECT_EQ(read_csv(folder / "reactions.csv").size(), 5u) << "one row per window";
 }
 
 TEST(Coupling, a_solid_that_fails_tells_its_partner_and_leaves_a_summary) {

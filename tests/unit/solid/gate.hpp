@@ -13,6 +13,7 @@ inline SolidParams gate_params() {
   p.width = 0.005;
   p.height = 0.079;
   p.elements_along = 28;
+  p.element = "incompatible-modes";
   p.density = 1100;
   p.youngs_modulus = 12e6;
   p.poisson_ratio = 0.4;

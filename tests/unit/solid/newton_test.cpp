@@ -19,7 +19,7 @@ struct PressedBlock {
     }
   }
   NewtonReport solve(Iterate &iterate, int max_iterations) {
-    Assembly<2> assembly(mesh, NeoHookean{{1, 1}}, 1, fixed);
+    Assembly<2> assembly(mesh, {NeoHookean{{1, 1}}}, 1, fixed);
     return Newton<2>(assembly, {1e-12, max_iterations}).solve({1, 0, {}, load}, iterate);
   }
   static Iterate at_rest() { return {Eigen::VectorXd::Zero(8), {}}; }

@@ -179,6 +179,48 @@ TEST(Step, a_step_without_a_solution_says_so_with_numbers) {
   EXPECT_EQ(error_of_step(solver, 1), "") << "the solver is usable afterwards";
 }
 
+TEST(Step, a_step_without_a_solution_can_be_told_from_other_failures) {
+  auto params = gate_params();
+  params.newton_max_iterations = 3;
+  SolidSolver<2> solver(params);
+  EXPECT_THROW(solver.step(solver.initial_state(), 1e7 * dead_load(solver), 2e-4), NoSolution);
+}
+
+TEST(Window, steps_in_a_window_are_the_steps_of_as_many_windows) {
+  auto params = gate_params();
+  params.steps_per_window = 4;
+  SolidSolver<2> inside(params), outside(gate_params());
+  const Eigen::VectorXd load = dead_load(inside);
+  SolidState a = inside.initial_state(), b = a;
+  a = inside.advance(a, load, 8e-4);
+  for (int k = 0; k < 4; ++k)
+    b = outside.advance(b, load, 2e-4);
+  expect_same(a, b);
+}
+
+// Three iterations do not solve a step of 20 ms, but they solve shorter ones.
+TEST(Window, a_step_without_a_solution_is_halved_and_counted) {
+  auto params = gate_params();
+  params.newton_max_iterations = 4;
+  params.max_step_cuts = 8;
+  SolidSolver<2> solver(params);
+  const auto end = solver.advance(solver.initial_state(), 3 * dead_load(solver), 0.02);
+  EXPECT_GT(solver.counts().cut_steps, 0);
+  EXPECT_GT(solver.assembly().smallest_det(end.displacement, end.modes), 0);
+  params.newton_max_iterations = 50;
+  SolidSolver<2> patient(params);
+  SolidState fine = patient.initial_state();
+  for (int k = 0; k < 100; ++k)
+    fine = patient.step(fine, 3 * dead_load(patient), 2e-4);
+  // Other steps, other errors in time: steps down to 1.25 ms against 0.2 ms.
+  EXPECT_NEAR(tip(solver, end, 0) / tip(patient, fine, 0), 1, 0.05);
+  params.newton_max_iterations = 1;
+  params.max_step_cuts = 1;
+  SolidSolver<2> hopeless(params);
+  EXPECT_THROW(hopeless.advance(hopeless.initial_state(), 3 * dead_load(hopeless), 0.02),
+               NoSolution);
+}
+
 TEST(Step, a_force_that_is_not_finite_is_refused) {
   SolidSolver<2> solver(gate_params());
   EXPECT_NE(error_of_step(solver, std::nan("")).find("not finite"), std::string::npos);

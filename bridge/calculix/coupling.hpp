@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: MIT
+// The adapter: runs ccx against its partner through the bridge. The only file here that knows the
+// bridge's participant.
+#pragma once
+
+#include "bridge/base/config.hpp"
+
+#include <filesystem>
+
+namespace sluice::bridge {
+class Participant;
+}
+
+namespace sluice::calculix {
+
+/// Runs the case to its end, writing into `folder` once the partner is met. Throws UserError on any
+/// failure, after the partner has been told and the summary of what was computed has been written.
+void run(const Config &config, const std::filesystem::path &folder);
+
+/// The same with a participant that is already made (tests: one that speaks to a thread).
+void run(bridge::Participant &bridge, const Config &config, const std::filesystem::path &folder);
+
+} // namespace sluice::calculix

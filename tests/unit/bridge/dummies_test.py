@@ -1,0 +1,66 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""The dummy solvers of every language, as separate programs: all follow the closed form."""
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+BUILD, SOURCES = Path(os.environ["SLUICE_BRIDGE_BUILD"]), Path(os.environ["SLUICE_DUMMIES"])
+WINDOWS, STEP = 50, 1e-3
+CASE = f"""
+[case]
+name = "piston"
+end_time_s = {WINDOWS * STEP}
+time_step_s = {STEP}
+[bridge]
+displacement_tolerance = 1e-8
+force_tolerance = 1e-8
+connect_deadline_s = 20
+"""
+# A mass of 1 kg with 80 kg of water on a spring, both by the trapezoidal rule, from 0.01 m at rest.
+EXACT = 0.01 * math.cos(WINDOWS * 2 * math.atan(STEP / 2 * math.sqrt(4e4 / 81)))
+
+
+class Dummies(unittest.TestCase):
+    def follow_the_closed_form(self, *solid):
+        with tempfile.TemporaryDirectory() as folder:
+            case = Path(folder) / "case.toml"
+            case.write_text(CASE)
+            fluid = subprocess.Popen([BUILD / "dummy_fluid", case, folder])
+            try:
+                answer = subprocess.run([str(part) for part in solid[:-1]] + [str(case), folder]
+                                        + [str(part) for part in solid[-1]],
+                                        capture_output=True, text=True, timeout=60)
+                self.assertEqual(answer.returncode, 0, answer.stderr)
+                self.assertEqual(fluid.wait(20), 0)
+            finally:
+                fluid.kill()
+                fluid.wait()
+        # The tolerance of a window adds up over the windows.
+        self.assertAlmostEqual(float(answer.stdout), EXACT, delta=0.01 * WINDOWS * 1e-8)
+
+    def test_c(self):
+        self.follow_the_closed_form(BUILD / "dummy_solid_c", [])
+
+    def test_fortran(self):
+        program = BUILD / "dummy_solid_fortran"
+        if not program.exists():
+            self.fail("cases/setup installs gfortran, and the build skipped its dummy")
+        self.follow_the_closed_form(program, [])
+
+    def test_python(self):
+        self.follow_the_closed_form(sys.executable, SOURCES / "solid.py", [BUILD / "libsluice.so"])
+
+    def test_a_case_file_that_is_missing_is_named(self):
+        answer = subprocess.run([BUILD / "dummy_solid_c", "no-such.toml", "."],
+                                capture_output=True, text=True)
+        self.assertEqual(answer.returncode, 1)
+        self.assertIn("no-such.toml", answer.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
