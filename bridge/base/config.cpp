@@ -121,6 +121,8 @@ std::string nearest_word(std::string_view word, std::span<const std::string> can
 }
 
 Config Config::load(const std::filesystem::path &file, std::span<const std::string> overrides) {
+  check(!std::filesystem::is_directory(file),
+        "{}: is a folder; give the path of the .toml file in it", file.string());
   std::ifstream in(file, std::ios::binary);
   check(in.good(), "{}: cannot open the case file; give the path of a .toml file", file.string());
   std::stringstream text;

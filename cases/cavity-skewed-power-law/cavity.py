@@ -14,7 +14,7 @@ from run_folder import RunError
 REFERENCE = Path(__file__).resolve().parent / "reference"
 CENTRE_BAND = 0.005
 STEADY_BAND = 1e-4           # change of the profiles per unit of time
-JUDGED_FROM = 10.0           # before, the flow is still setting in
+JUDGED_FROM = 12.0           # before, the flow is still setting in
 SIDE_LENGTH = 1.0
 
 

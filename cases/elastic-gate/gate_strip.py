@@ -25,6 +25,9 @@ def frames(run):
         time, file = min(clouds, key=lambda entry: abs(entry[0] - k * INTERVAL_S))
         if abs(time - k * INTERVAL_S) < 0.25 * INTERVAL_S:
             chosen.append((time, file, solid_at(solids, time)))
+    last, file = clouds[-1]
+    if last - chosen[-1][0] > 0.5 * INTERVAL_S:  # a run that ended between two instants
+        chosen.append((last, file, solid_at(solids, last)))
     return chosen
 
 

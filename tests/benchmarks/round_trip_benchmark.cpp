@@ -19,6 +19,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 using namespace sluice;
@@ -133,8 +134,8 @@ struct RoundTrip {
 };
 
 RoundTrip through_bridge(const std::string &transport, std::size_t n_nodes) {
-  char folder[] = "/tmp/sluice-round-trip-XXXXXX";
-  if (!::mkdtemp(folder))
+  std::string folder = std::filesystem::temp_directory_path() / "sluice-round-trip-XXXXXX";
+  if (!::mkdtemp(folder.data()))
     std::abort();
   const Config config = config_for(transport, repetitions(n_nodes));
   RoundTrip result;

@@ -203,6 +203,11 @@ class PlotTest(RunTest):
         times = [time for time, _, _ in gate_strip.frames(RunFolder(self.path))]
         self.assertEqual([round(t, 6) for t in times], [0.0, 0.04, 0.08, 0.12])
 
+    def test_strip_ends_with_the_last_picture_of_a_run_that_ended_between_two(self):
+        self.write(end=0.03, interval=0.01, fields=True, spacing=0.008)
+        times = [time for time, _, _ in gate_strip.frames(RunFolder(self.path))]
+        self.assertEqual([round(t, 6) for t in times], [0.0, 0.03])
+
     def test_run_cut_short_before_any_field_still_gives_the_curves(self):
         self.write(end=0.01)
         done = self.plot()
