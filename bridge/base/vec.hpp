@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <concepts>
 
 namespace sluice {
 
@@ -13,7 +14,10 @@ template <int dim> using Mat = Eigen::Matrix<double, dim, dim>;
 /// z-component of the cross product of two plane vectors.
 inline double cross(const Vec<2> &a, const Vec<2> &b) { return a.x() * b.y() - a.y() * b.x(); }
 
-inline Vec<3> cross(const Vec<3> &a, const Vec<3> &b) {
+/// Cross product of two vectors in space. Of nothing but vectors: an expression in the plane is for
+/// the function above.
+template <class Vector>
+requires std::same_as<Vector, Vec<3>> Vec<3> cross(const Vector &a, const Vector &b) {
   return {a.y() * b.z() - a.z() * b.y(), a.z() * b.x() - a.x() * b.z(),
           a.x() * b.y() - a.y() * b.x()};
 }
