@@ -7,6 +7,7 @@
 #include "bridge/settings.hpp"
 #include "fluid/history.hpp"
 #include "fluid/state_file.hpp"
+#include "fluid/surface_file.hpp"
 
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -87,7 +88,7 @@ template <int dim> bool has_partner(const Scene<dim> &scene) {
 
 /// The water as filled, or as another run left it.
 template <int dim> Start<dim> start_of(const Config &config, const bridge::CaseSettings &settings) {
-  Start<dim> start{.scene = read_scene<dim>(config)};
+  Start<dim> start{.scene = read_scene<dim>(config, read_surface_file)};
   const FluidParams<dim> &params = start.scene.params;
   if (params.start_state.empty())
     return start;

@@ -19,9 +19,10 @@ namespace {
 // Places along z where what is given in the plane is repeated: both ends, and in between so that no
 // coupled triangle is wider than its segments are long. One list for all walls: their triangles
 // meet.
-std::vector<double> swept_places(const std::vector<WallParams> &tables, double depth) {
+template <int dim>
+std::vector<double> swept_places(const std::vector<WallParams<dim>> &tables, double depth) {
   double longest = depth;
-  for (const WallParams &wall : tables)
+  for (const WallParams<dim> &wall : tables)
     if (wall.segment_length > 0)
       longest = std::min(longest, wall.segment_length);
   const int pieces = std::max(1, static_cast<int>(std::ceil(depth / longest - 1e-9)));
@@ -34,7 +35,7 @@ std::vector<double> swept_places(const std::vector<WallParams> &tables, double d
 /// Adds the walls of the case file to the scene's.
 template <int dim> class WallBuilder {
 public:
-  WallBuilder(const std::vector<WallParams> &tables, double depth, Walls<dim> &walls)
+  WallBuilder(const std::vector<WallParams<dim>> &tables, double depth, Walls<dim> &walls)
       : walls_(walls) {
     if constexpr (dim == 3)
       z_ = swept_places(tables, depth);
@@ -42,20 +43,16 @@ public:
       z_ = {0};
   }
 
-  void add(const WallParams &wall) {
+  void add(const WallParams<dim> &wall, const SurfaceMesh &surface) {
     check(!wall.coupled || wall.velocity.isZero(),
           "wall '{}': a coupled wall moves as its partner says, not with velocity_m_s", wall.name);
     start(wall.name, wall.condition);
     const int first = static_cast<int>(walls_.position.size());
     const int first_face = static_cast<int>(walls_.faces.size());
-    const std::vector<Vec<2>> outline = cut_into_segments(wall);
-    for (const Vec<2> &x : outline)
-      for (const double z : z_)
-        walls_.position.push_back(place(x, z));
-    for (int k = 1; k < static_cast<int>(outline.size()); ++k)
-      add_segment(first + (k - 1) * n_z(), first + k * n_z());
-    for (int f = first_face; f < static_cast<int>(walls_.faces.size()); ++f)
-      walls_.faces[f].number = f - first_face;
+    if (wall.file.empty())
+      sweep(wall);
+    else
+      add_surface(surface, wall.reversed);
     walls_.velocity.resize(walls_.position.size(), place(wall.velocity, 0));
     if (!wall.coupled)
       return;
@@ -86,6 +83,34 @@ public:
   }
 
 private:
+  void sweep(const WallParams<dim> &wall) {
+    const int first = static_cast<int>(walls_.position.size());
+    const int first_face = static_cast<int>(walls_.faces.size());
+    const std::vector<Vec<2>> outline = cut_into_segments(wall);
+    for (const Vec<2> &x : outline)
+      for (const double z : z_)
+        walls_.position.push_back(place(x, z));
+    for (int k = 1; k < static_cast<int>(outline.size()); ++k)
+      add_segment(first + (k - 1) * n_z(), first + k * n_z());
+    for (int f = first_face; f < static_cast<int>(walls_.faces.size()); ++f)
+      walls_.faces[f].number = f - first_face;
+  }
+
+  void add_surface([[maybe_unused]] const SurfaceMesh &surface, [[maybe_unused]] bool reversed) {
+    if constexpr (dim == 3) {
+      const int first = static_cast<int>(walls_.position.size());
+      walls_.position.insert(walls_.position.end(), surface.position.begin(),
+                             surface.position.end());
+      for (std::size_t k = 0; k < surface.triangles.size(); ++k) {
+        auto [a, b, c] = surface.triangles[k];
+        if (reversed)
+          std::swap(b, c);
+        add_face({first + a, first + b, first + c});
+        walls_.faces.back().number = surface.face[k];
+      }
+    }
+  }
+
   int n_z() const { return static_cast<int>(z_.size()); }
 
   static Vec<dim> place(const Vec<2> &x, [[maybe_unused]] double z) {
@@ -115,7 +140,7 @@ private:
       }
   }
 
-  static std::vector<Vec<2>> cut_into_segments(const WallParams &wall) {
+  static std::vector<Vec<2>> cut_into_segments(const WallParams<dim> &wall) {
     std::vector<Vec<2>> outline{wall.points.front()};
     for (std::size_t k = 1; k < wall.points.size(); ++k) {
       check((wall.points[k] - wall.points[k - 1]).norm() > 1e-9,
@@ -131,7 +156,7 @@ private:
     return outline;
   }
 
-  static void cut_leg(const WallParams &wall, const Vec<2> &to, std::vector<Vec<2>> &outline) {
+  static void cut_leg(const WallParams<dim> &wall, const Vec<2> &to, std::vector<Vec<2>> &outline) {
     const Vec<2> from = outline.back();
     const double length = (to - from).norm();
     constexpr double most_pieces = 1e6;
@@ -165,18 +190,42 @@ template <class Named> void check_names(const std::vector<Named> &all, std::stri
   }
 }
 
-template <int dim> Walls<dim> read_walls(const Config &config, const FluidParams<dim> &params) {
+template <int dim>
+SurfaceMesh surface_of(const WallParams<dim> &wall, const Config &config,
+                       const SurfaceReader &read_surface) {
+  if (wall.file.empty())
+    return {};
+  check(read_surface != nullptr, "wall '{}': this program was built without a reader of files",
+        wall.name);
+  return read_surface(std::filesystem::path(config.file_name()).parent_path() / wall.file);
+}
+
+void check_surfaces(const std::vector<WallParams<2>> &, const Walls<2> &) {}
+void check_surfaces(const std::vector<WallParams<3>> &tables, const Walls<3> &walls) {
+  for (int w = 0; w < static_cast<int>(tables.size()); ++w) {
+    if (tables[w].file.empty())
+      continue;
+    if (!tables[w].open)
+      check_closed(walls, w);
+    check_free_of_crossings(walls, w);
+  }
+}
+
+template <int dim>
+Walls<dim> read_walls(const Config &config, const FluidParams<dim> &params,
+                      const SurfaceReader &read_surface) {
   Walls<dim> walls;
-  const auto tables = config.read_all<WallParams>("fluid.wall");
+  const auto tables = config.read_all<WallParams<dim>>("fluid.wall");
   check(!tables.empty(), "{}: the scene has no [[fluid.wall]]", config.file_name());
   check_names(tables, "wall");
   WallBuilder<dim> builder(tables, params.depth, walls);
-  for (const WallParams &wall : tables)
-    builder.add(wall);
+  for (const WallParams<dim> &wall : tables)
+    builder.add(wall, surface_of(wall, config, read_surface));
   if constexpr (dim == 3)
     if (params.side_walls != "none")
       builder.add_sides(params.side_walls);
   link_faces(walls);
+  check_surfaces(tables, walls);
   return walls;
 }
 
@@ -392,14 +441,17 @@ struct Dimension {
 
 int dimension_of(const Config &config) { return config.peek<Dimension>("fluid").value; }
 
-template <int dim> Scene<dim> read_scene(const Config &config) {
+template <int dim> Scene<dim> read_scene(const Config &config, const SurfaceReader &read_surface) {
   Scene<dim> scene;
   scene.params = config.read<FluidParams<dim>>("fluid");
   scene.params.rheology =
       Rheology(config.read<RheologyParams>("fluid.rheology"), scene.params.viscosity);
-  scene.walls = read_walls(config, scene.params);
+  scene.walls = read_walls(config, scene.params, read_surface);
   scene.gauges = config.read_all<GaugeParams<dim>>("fluid.gauge");
   check_names(scene.gauges, "gauge");
+  for (GaugeParams<dim> &gauge : scene.gauges)
+    if (std::isnan(gauge.z))
+      gauge.z = 0.5 * scene.params.depth;
   scene.probes = config.read_all<ProbeParams<dim>>("fluid.probe");
   check_names(scene.probes, "probe");
   scene.initial.points = fill(scene.params);
@@ -411,9 +463,9 @@ template <int dim> Scene<dim> read_scene(const Config &config) {
 
 template double volume_error(const Scene<2> &);
 template void check_clear_of_walls(const Scene<2> &, double);
-template Scene<2> read_scene(const Config &);
+template Scene<2> read_scene(const Config &, const SurfaceReader &);
 template double volume_error(const Scene<3> &);
 template void check_clear_of_walls(const Scene<3> &, double);
-template Scene<3> read_scene(const Config &);
+template Scene<3> read_scene(const Config &, const SurfaceReader &);
 
 } // namespace sluice::fluid

@@ -7,8 +7,10 @@
 #include "fluid/motion.hpp"
 #include "fluid/points.hpp"
 #include "fluid/rheology.hpp"
+#include "fluid/surface_mesh.hpp"
 #include "fluid/walls.hpp"
 
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -98,19 +100,31 @@ template <int dim> struct FluidParams {
   }
 };
 
-/// Table [[fluid.wall]]: a polyline with the fluid on its left; in space it is swept along z.
-struct WallParams {
+/// Table [[fluid.wall]]: a polyline with the fluid on its left, in space swept along z; or, in
+/// space, a surface from a file.
+template <int dim> struct WallParams {
   std::string name;
   std::string condition = "no-slip";
   std::vector<Vec<2>> points;
+  std::string file;
+  bool open = false, reversed = false;
   bool coupled = false;
   double segment_length = 0;
   Vec<2> velocity{0, 0};
 
   template <class Reader> void describe(Reader &read) {
     read.required("name", name, "name of the wall");
-    read.required("points_m", points, "polyline with the fluid on its left")
-        .check(points.size() >= 2, "needs at least two points");
+    if constexpr (dim == 2) {
+      read.required("points_m", points, "polyline with the fluid on its left")
+          .check(points.size() >= 2, "needs at least two points");
+    } else {
+      read("file", file, "surface of triangles and quadrilaterals: .stl, .obj, .ply or .vtp");
+      read("open", open, "the surface of the file may have a border, as a tank without a lid");
+      read("reversed", reversed, "the fluid lies behind the faces of the file, not in front");
+      read("points_m", points, "polyline with the fluid on its left, swept along z")
+          .check(file.empty() ? points.size() >= 2 : points.empty(),
+                 "needs at least two points, or none where a file is given");
+    }
     read("condition", condition, "what holds for viscous water that flows along the wall")
         .one_of({"no-slip", "free-slip"});
     read("coupled", coupled, "moves with the partner of the bridge");
@@ -122,13 +136,13 @@ struct WallParams {
 /// Table [[fluid.gauge]]: water level at a place, measured along y.
 template <int dim> struct GaugeParams {
   std::string name;
-  double x = 0, z = 0;
+  double x = 0, z = std::numeric_limits<double>::quiet_NaN();
 
   template <class Reader> void describe(Reader &read) {
     read.required("name", name, "name of the gauge: letters, digits, _ and -");
     read.required("x_m", x, "place of the gauge");
     if constexpr (dim == 3)
-      read.required("z_m", z, "place of the gauge");
+      read("z_m", z, "place of the gauge; in the middle when not given");
   }
 };
 
@@ -165,8 +179,10 @@ template <int dim> void check_clear_of_walls(const Scene<dim> &scene, double tol
 /// Number of dimensions that the case file asks for, 2 or 3. Throws UserError on any other.
 int dimension_of(const Config &config);
 
-/// Reads the tables of the fluid and fills the water. Throws UserError, with place and numbers, on
-/// water that overlaps a wall, a hole in the walls below the water line, or too few points.
-template <int dim> Scene<dim> read_scene(const Config &config);
+/// Reads the tables of the fluid and fills the water; `read_surface` reads walls from files. Throws
+/// UserError, with place and numbers, on water that overlaps a wall, a hole in the walls below the
+/// water line, or too few points.
+template <int dim>
+Scene<dim> read_scene(const Config &config, const SurfaceReader &read_surface = {});
 
 } // namespace sluice::fluid
