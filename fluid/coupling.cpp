@@ -169,6 +169,7 @@ public:
     const std::vector<Vec<dim>> at_rest(solver_.walls.position.size(), Vec<dim>::Zero());
     StepClock clock(start_.time, settings_.end_time, settings_.time_step);
     while (!clock.is_over()) {
+      move_walls(start_.scene.prescribed, clock.time(), clock.step_size(), solver_.walls);
       solver_.begin_step(clock.step_size());
       solver_.iterate();
       solver_.end_step();
@@ -202,6 +203,7 @@ public:
       surface.read_velocities(bridge, dt, solver_.walls);
       if (is_first || repeats_step) {
         surface.read_positions(bridge, dt, solver_.walls);
+        move_walls(start_.scene.prescribed, bridge.time(), dt, solver_.walls);
         solver_.begin_step(dt);
       }
       solver_.iterate();

@@ -308,18 +308,28 @@ std::optional<std::vector<Vector>> vectors_of(const toml::node &node) {
   return all;
 }
 
-std::optional<std::vector<double>> numbers_of(const toml::node &node) {
+// Every element of a list, each by `parse`.
+template <class T>
+std::optional<std::vector<T>> list_of(const toml::node &node,
+                                      std::optional<T> (*parse)(const toml::node &)) {
   const auto *array = node.as_array();
   if (!array)
     return std::nullopt;
-  std::vector<double> all;
+  std::vector<T> all;
   for (const auto &element : *array) {
-    const auto x = number(element);
+    auto x = parse(element);
     if (!x)
       return std::nullopt;
-    all.push_back(*x);
+    all.push_back(std::move(*x));
   }
   return all;
+}
+
+std::optional<std::vector<double>> numbers_of(const toml::node &node) {
+  return list_of<double>(node, number);
+}
+std::optional<std::vector<std::string>> texts_of(const toml::node &node) {
+  return list_of<std::string>(node, exactly<std::string>);
 }
 
 } // namespace
@@ -372,6 +382,10 @@ void TableReader::read_value(std::string_view key, std::vector<Vec<2>> &value,
 void TableReader::read_value(std::string_view key, std::vector<double> &value,
                              std::string_view help, bool required) {
   read_parsed(key, value, help, required, numbers_of, "a list of numbers");
+}
+void TableReader::read_value(std::string_view key, std::vector<std::string> &value,
+                             std::string_view help, bool required) {
+  read_parsed(key, value, help, required, texts_of, "a list of texts in quotes");
 }
 
 namespace {

@@ -85,6 +85,8 @@ private:
                   bool required);
   void read_value(std::string_view key, std::vector<double> &value, std::string_view help,
                   bool required);
+  void read_value(std::string_view key, std::vector<std::string> &value, std::string_view help,
+                  bool required);
 
   template <class T, class Parse>
   void read_parsed(std::string_view key, T &value, std::string_view help, bool required,

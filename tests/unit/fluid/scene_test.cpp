@@ -125,5 +125,66 @@ TEST(Scene, AcceptsAGateThatOverlapsTheFloorByATenthOfAMillimetre) {
   EXPECT_EQ(message_of([&] { scene_of(text); }), "");
 }
 
+// An L-shaped basin, 1 m wide below and 0.5 m above y = 0.5.
+const std::string basin = R"(
+[fluid]
+spacing_m = 0.1
+fill_from_m = [0.7, 0.2]
+fill_level_m = 0.8
+[[fluid.wall]]
+name = "basin"
+points_m = [[0.5, 2], [0.5, 0.5], [0, 0.5], [0, 0], [1, 0], [1, 2]]
+)";
+
+TEST(Scene, AFloodFillsWhatItReachesBelowItsLevel) {
+  const Scene<2> scene = scene_of(basin);
+  EXPECT_EQ(scene.initial.points.size(), 10 * 5 + 5 * 3);
+  for (int i = 0; i < scene.initial.points.size(); ++i)
+    EXPECT_NEAR(scene.initial.points.pressure[i],
+                1000 * 9.81 * (0.8 - scene.initial.points.position[i].y()), 1e-9);
+}
+
+TEST(Scene, RefusesAFloodThatRunsOutOfTheScene) {
+  const std::string message = message_of([] {
+    scene_of(replaced(basin, "[0, 0], [1, 0], [1, 2]", "[0, 0], [0.6, 0], [0.6, -2], [2, -2]"));
+  });
+  EXPECT_TRUE(contains(message, "runs out of the scene")) << message;
+}
+
+TEST(Scene, RefusesAFloodFromAboveItsLevel) {
+  const std::string message = message_of([] { scene_of(basin, {"fluid.fill_level_m=0.1"}); });
+  EXPECT_TRUE(contains(message, "fill_from_m = (0.7, 0.2) m is above fill_level_m = 0.1"))
+      << message;
+}
+
+TEST(Scene, StartsWithTheVelocityOfItsFormulas) {
+  const Scene<2> scene = scene_of(
+      basin, {R"~(fluid.start_velocity_m_s=["2*y", "-3*sin(x)"])~", "fluid.start_jitter=0.2"});
+  for (int i = 0; i < scene.initial.points.size(); ++i) {
+    const Vec<2> &x = scene.initial.points.position[i];
+    EXPECT_EQ(scene.initial.points.velocity[i], Vec<2>(2 * x.y(), -3 * std::sin(x.x())));
+  }
+}
+
+TEST(Scene, SaysWhereAFormulaCannotBeRead) {
+  const std::string message =
+      message_of([] { scene_of(basin, {R"(fluid.start_velocity_m_s=["2*y", "3*speed"])"}); });
+  EXPECT_TRUE(contains(message, "start_velocity_m_s")) << message;
+  EXPECT_TRUE(contains(message, "\"speed\"")) << message;
+}
+
+TEST(Scene, APrescribedWallStartsWhereItsLawSaysAndMovesByIt) {
+  Scene<2> scene = scene_of(replaced(basin, "name = \"basin\"", R"~(name = "basin"
+displacement_m = ["0.1*cos(2*t)", "0.5*t*y"])~"),
+                            {"fluid.fill_from_m=[0.8, 0.2]"});
+  EXPECT_EQ(scene.walls.position[4], Vec<2>(1.1, 0));
+  move_walls(scene.prescribed, 1.0, 0.01, scene.walls);
+  EXPECT_NEAR((scene.walls.position[5] - Vec<2>(1 + 0.1 * std::cos(2.02), 2 + 1.01)).norm(), 0,
+              1e-15);
+  // the mean over the step: its position is exact at both ends
+  EXPECT_NEAR(scene.walls.velocity[5].x(), 10 * (std::cos(2.02) - std::cos(2.0)), 1e-12);
+  EXPECT_NEAR(scene.walls.velocity[5].y(), 1, 1e-12);
+}
+
 } // namespace
 } // namespace sluice::fluid
