@@ -7,6 +7,7 @@
 #include "bridge/settings.hpp"
 #include "fluid/history.hpp"
 #include "fluid/state_file.hpp"
+#include "fluid/step_limit.hpp"
 #include "fluid/surface_file.hpp"
 
 #include <nlohmann/json.hpp>
@@ -129,27 +130,35 @@ template <int dim> void note_volume_error(const Scene<dim> &scene) {
                100 * error, scene.params.spacing);
 }
 
-/// Steps of the fluid alone: counted, so that a run that goes on from another keeps its times; the
-/// last one is as long as the end time leaves it.
+/// Time of the fluid alone. Steps of the given length are counted, so that a run that goes on from
+/// another keeps its times; others are summed. The last one is as long as the end leaves it.
 class StepClock {
 public:
-  StepClock(double start, double end, double length) : end_(end), length_(length) {
+  StepClock(double start, double end, double length) : end_(end), length_(length), origin_(start) {
     const double steps_before = std::round(start / length);
-    const bool on_grid = std::abs(start - steps_before * length) <= 1e-6 * length;
-    origin_ = on_grid ? 0 : start;
-    step_ = on_grid ? static_cast<long>(steps_before) : 0;
+    if (std::abs(start - steps_before * length) > 1e-6 * length)
+      return;
+    origin_ = 0;
+    step_ = static_cast<long>(steps_before);
   }
   bool is_over() const { return end_ - time() <= 1e-6 * length_; }
   double time() const { return origin_ + static_cast<double>(step_) * length_; } ///< [s]
-  /// The next step's length [s].
-  double step_size() const {
+  /// The next step's length where it is held to `limit` [s].
+  double step_size(double limit) const {
     const double left = end_ - time();
-    return left < (1 - 1e-6) * length_ ? left : length_;
+    return left < (1 - 1e-6) * limit ? left : limit;
   }
-  void next() { ++step_; }
+  void pass(double step) {
+    if (step == length_) {
+      ++step_;
+    } else {
+      origin_ = time() + step;
+      step_ = 0;
+    }
+  }
 
 private:
-  double end_, length_, origin_ = 0;
+  double end_, length_, origin_;
   long step_ = 0;
 };
 
@@ -169,11 +178,15 @@ public:
     const std::vector<Vec<dim>> at_rest(solver_.walls.position.size(), Vec<dim>::Zero());
     StepClock clock(start_.time, settings_.end_time, settings_.time_step);
     while (!clock.is_over()) {
-      move_walls(start_.scene.prescribed, clock.time(), clock.step_size(), solver_.walls);
-      solver_.begin_step(clock.step_size());
+      const LimitedStep limited =
+          limited_step(solver_.state, solver_.walls, solver_.params(), settings_.time_step);
+      const double dt = clock.step_size(limited.size);
+      move_walls(start_.scene.prescribed, clock.time(), dt, solver_.walls);
+      solver_.begin_step(dt);
       solver_.iterate();
       solver_.end_step();
-      clock.next();
+      clock.pass(dt);
+      history_->count(limited);
       finish_step(interface_totals(solver_, at_rest, at_rest),
                   std::min(clock.time(), settings_.end_time));
     }

@@ -175,6 +175,14 @@ double water_level(const Points<dim> &points, const VerticalLine<dim> &line, dou
   return level > bottom || !floor ? level + 0.5 * spacing : bottom;
 }
 
+template <int dim> double front(const Points<dim> &points, double y, double spacing) {
+  double farthest = std::numeric_limits<double>::quiet_NaN();
+  for (const Vec<dim> &x : points.position)
+    if (std::abs(x.y() - y) < spacing)
+      farthest = std::fmax(farthest, x.x() + 0.5 * spacing);
+  return farthest;
+}
+
 template Integrals<2> integrate(const FluidState<2> &, const FluidParams<2> &);
 template Integrals<2> integrate(const FluidSolver<2> &);
 template bridge::InterfaceTotals interface_totals(const FluidSolver<2> &, VecView<2>, VecView<2>);
@@ -187,5 +195,7 @@ template bridge::InterfaceTotals interface_totals(const FluidSolver<3> &, VecVie
 template std::optional<double> floor_at(const Walls<3> &, const VerticalLine<3> &);
 template double water_level(const Points<3> &, const VerticalLine<3> &, double,
                             std::optional<double>);
+template double front(const Points<2> &, double, double);
+template double front(const Points<3> &, double, double);
 
 } // namespace sluice::fluid

@@ -68,4 +68,8 @@ template <int dim>
 double water_level(const Points<dim> &points, const VerticalLine<dim> &line, double spacing,
                    std::optional<double> floor);
 
+/// The farthest place along x that the water reaches within a spacing of the height y [m]: a point
+/// and half a spacing; NaN where there is none.
+template <int dim> double front(const Points<dim> &points, double y, double spacing);
+
 } // namespace sluice::fluid

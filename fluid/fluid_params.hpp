@@ -35,6 +35,7 @@ template <int dim> struct FluidParams {
   std::string coupled_walls = "move";
   std::string start_state;
   int time_order = 1;
+  double courant = 0;
   double pressure_tolerance = 1e-6;
   double row_guard = 0.1;
   double gradient_guard = 20;
@@ -91,6 +92,11 @@ template <int dim> struct FluidParams {
          "pressure")
         .at_least(1)
         .at_most(2);
+    read("courant", courant,
+         "spacings that the fastest point may move in a step, which then is adapted; 0: always "
+         "case.time_step_s. For the fluid alone")
+        .at_least(0)
+        .at_most(1);
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")
         .at_least(1e-12)
         .at_most(1e-2);

@@ -230,8 +230,7 @@ private:
     float off_diagonal = 0;
     for (std::size_t k = m_.row_start_[a]; k < block.value.size(); ++k)
       off_diagonal += std::abs(block.value[k]);
-    const bool is_sound =
-        diagonal > vanishing * weight_sum && off_diagonal < degenerate * diagonal;
+    const bool is_sound = diagonal > vanishing * weight_sum && off_diagonal < degenerate * diagonal;
     result_.scale[a] = is_sound ? 1 / diagonal : 0;
   }
 

@@ -28,7 +28,7 @@ template <int dim> std::string series_header(const std::vector<GaugeParams<dim>>
             vector("wall_force", "n") + vector("outlet_momentum", "n_s") +
             ",guarded_rows,pressure_iterations,wall_returns,lost_points,points";
   for (const GaugeParams<dim> &gauge : gauges)
-    header += ",level_" + gauge.name + "_m";
+    header += (gauge.is_front() ? ",front_" : ",level_") + gauge.name + "_m";
   return header;
 }
 
@@ -148,7 +148,9 @@ void History<dim>::record(const FluidSolver<dim> &solver, const bridge::Interfac
               static_cast<double>(state.points.size())});
   for (const GaugeParams<dim> &gauge : gauges_) {
     const VerticalLine<dim> line = line_of(gauge);
-    row.push_back(water_level(state.points, line, spacing, floor_at(solver.walls, line)));
+    row.push_back(gauge.is_front()
+                      ? front(state.points, gauge.y, spacing)
+                      : water_level(state.points, line, spacing, floor_at(solver.walls, line)));
   }
   series_.row(row);
   write_fields(solver, time);
@@ -171,6 +173,11 @@ template <int dim> void History<dim>::write_fields(const FluidSolver<dim> &solve
 template <int dim>
 void History<dim>::write_state_file(const FluidSolver<dim> &solver, double time) const {
   write_state<dim>(folder_ / "fluid_state.h5", {solver.state, time, solver.params().spacing});
+}
+
+template <int dim> void History<dim>::count(const LimitedStep &step) {
+  ++limits_[static_cast<std::size_t>(step.limit)];
+  smallest_step_ = std::min(smallest_step_, step.size);
 }
 
 template <int dim> std::string History<dim>::note() const {
@@ -214,6 +221,11 @@ void History<dim>::write_summary(const FluidSolver<dim> &solver, const std::stri
                                        {"surface", rows.surface},
                                        {"pairs", rows.pairs}};
   summary["volume_drift_max"] = volume_drift_max_;
+  if (solver.params().courant > 0) {
+    summary["smallest_step_s"] = smallest_step_;
+    for (std::size_t k = 0; k < limits_.size(); ++k)
+      summary["steps_held_by"][std::string(step_limit_names[k])] = limits_[k];
+  }
   if (steps_ > 0 && energy_scale_ > 0) {
     summary["energy_gain_max"] = energy_gain_max_ / energy_scale_;
     summary["energy_drift"] = energy_gain(last_) / energy_scale_;

@@ -8,6 +8,7 @@
 #include "fluid/diagnostics.hpp"
 #include "fluid/output_vtk.hpp"
 #include "fluid/probe.hpp"
+#include "fluid/step_limit.hpp"
 
 #include <filesystem>
 #include <nlohmann/json_fwd.hpp>
@@ -23,6 +24,8 @@ public:
 
   /// Records the step that has just ended at `time` [s]; `loads` are those on the coupled walls.
   void record(const FluidSolver<dim> &solver, const bridge::InterfaceTotals &loads, double time);
+  /// Counts what held the last step back.
+  void count(const LimitedStep &step);
   /// Writes fluid_summary.json, and of a complete run the state; `message` is empty for such a run.
   void write_summary(const FluidSolver<dim> &solver, const std::string &message,
                      const nlohmann::json &bridge_summary) const;
@@ -55,6 +58,8 @@ private:
   double energy_scale_ = 0; // [J], kinetic and potential above the lowest point at the start
   double volume_drift_max_ = 0, energy_gain_max_ = -1e300;
   double initial_volume_ = 0;
+  std::array<long, step_limit_names.size()> limits_{};
+  double smallest_step_ = 1e300;
   WallQuadrature<dim> all_walls_;
   std::vector<Vec<dim>> all_tractions_;
 };

@@ -53,9 +53,9 @@ public:
 private:
   struct Level {
     int rows = 0;
-    std::vector<Cell> cell;        // [rows]
+    std::vector<Cell> cell;              // [rows]
     std::vector<float> off_diagonal_sum; // [rows] of magnitudes
-    std::vector<float> weight;     // [rows] of the Jacobi step, 1 for isolated rows
+    std::vector<float> weight;           // [rows] of the Jacobi step, 1 for isolated rows
     std::vector<float> b, x, r;
     CoarseLevel coarser;
   };

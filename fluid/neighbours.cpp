@@ -40,8 +40,7 @@ template <int dim> Grid<dim> grid_over(const Points<dim> &points, double cell_si
   for (int i = 0; i < points.size(); ++i) {
     const Vec<dim> &x = points.position[i];
     if (!x.allFinite()) // no text is made of the others
-      fail("point {} has no finite position: {} m; reduce the time step", points.id[i],
-           text_of(x));
+      fail("point {} has no finite position: {} m; reduce the time step", points.id[i], text_of(x));
     low = low.cwiseMin(x);
     high = high.cwiseMax(x);
   }

@@ -26,17 +26,16 @@ struct PowerLaw {
 /// mu_inf + (mu_0 - mu_inf) (1 + (lambda gamma)^a)^((n-1)/a). Source: K. Yasuda, R. C. Armstrong,
 /// R. E. Cohen, Rheol. Acta 20 (1981) 163.
 struct CarreauYasuda {
-  double at_rest = 1, at_infinity = 0; // [Pa s]
+  double at_rest = 1, at_infinity = 0;          // [Pa s]
   double time = 1, exponent = 1, sharpness = 2; // [s], [-], [-]
   double operator()(double gamma) const {
-    return at_infinity + (at_rest - at_infinity) *
-                             std::pow(1 + std::pow(time * gamma, sharpness),
-                                      (exponent - 1) / sharpness);
+    return at_infinity + (at_rest - at_infinity) * std::pow(1 + std::pow(time * gamma, sharpness),
+                                                            (exponent - 1) / sharpness);
   }
 };
 
-/// mu_inf + (mu_0 - mu_inf) / (1 + (lambda gamma)^m). Source: M. M. Cross, J. Colloid Sci. 20 (1965)
-/// 417.
+/// mu_inf + (mu_0 - mu_inf) / (1 + (lambda gamma)^m). Source: M. M. Cross, J. Colloid Sci. 20
+/// (1965) 417.
 struct Cross {
   double at_rest = 1, at_infinity = 0; // [Pa s]
   double time = 1, exponent = 1;       // [s], [-]
@@ -49,8 +48,8 @@ struct Cross {
 /// regularised after T. C. Papanastasiou, J. Rheol. 31 (1987) 385: unyielded fluid creeps at
 /// gamma = tau / (tau_y m).
 struct HerschelBulkley {
-  double consistency = 1, exponent = 1;       // [Pa s^n], [-]
-  double yield_stress = 0, growth = 1000;     // [Pa], m [s]
+  double consistency = 1, exponent = 1;   // [Pa s^n], [-]
+  double yield_stress = 0, growth = 1000; // [Pa], m [s]
   double operator()(double gamma) const {
     return consistency * std::pow(gamma, exponent - 1) -
            yield_stress * std::expm1(-growth * gamma) / gamma;
@@ -72,8 +71,8 @@ struct RheologyParams {
 
   template <class Reader> void describe(Reader &read) {
     read("law", law, "viscosity as a function of the shear rate")
-        .one_of({"newtonian", "power-law", "carreau-yasuda", "cross", "bingham",
-                 "herschel-bulkley"});
+        .one_of(
+            {"newtonian", "power-law", "carreau-yasuda", "cross", "bingham", "herschel-bulkley"});
     read("consistency_pa_s_n", consistency, "k of power-law, bingham and herschel-bulkley")
         .positive();
     read("exponent", exponent, "n of power-law, carreau-yasuda and herschel-bulkley, m of cross")

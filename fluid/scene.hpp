@@ -10,23 +10,31 @@
 #include "fluid/wall_motion.hpp"
 #include "fluid/walls.hpp"
 
+#include <cmath>
 #include <limits>
 #include <string>
 #include <vector>
 
 namespace sluice::fluid {
 
-/// Table [[fluid.gauge]]: water level at a place, measured along y.
+/// Table [[fluid.gauge]]: the water's level at x, measured along y, or its front at the height y,
+/// measured along x.
 template <int dim> struct GaugeParams {
+  static constexpr double not_given = std::numeric_limits<double>::quiet_NaN();
+
   std::string name;
-  double x = 0, z = std::numeric_limits<double>::quiet_NaN();
+  double x = not_given, y = not_given, z = not_given;
 
   template <class Reader> void describe(Reader &read) {
     read.required("name", name, "name of the gauge: letters, digits, _ and -");
-    read.required("x_m", x, "place of the gauge");
+    read("x_m", x, "place at which the water level is measured");
+    read("y_m", y, "height at which the front of the water is measured, instead of x_m")
+        .check(std::isnan(x) != std::isnan(y), "is one of two: give x_m or y_m");
     if constexpr (dim == 3)
       read("z_m", z, "place of the gauge; in the middle when not given");
   }
+
+  bool is_front() const { return std::isnan(x); }
 };
 
 /// Table [[fluid.probe]]: places along a line.

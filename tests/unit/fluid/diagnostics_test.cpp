@@ -52,10 +52,13 @@ TEST(WaterLevel, DoesNotCareHowHighTheFloorIs) {
     auto x = testing::lattice(10, 20, h);
     for (Vec<2> &p : x)
       p.y() += floor;
-    EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, floor), floor + 2, 1e-12);
+    EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, floor), floor + 2,
+                1e-12);
     EXPECT_EQ(water_level<2>(testing::points_at(x), VerticalLine<2>(1.3), h, floor), floor); // dry
-    EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, std::nullopt), floor + 2, 1e-12);
-    EXPECT_TRUE(std::isnan(water_level<2>(testing::points_at(x), VerticalLine<2>(1.3), h, std::nullopt)));
+    EXPECT_NEAR(water_level<2>(testing::points_at(x), VerticalLine<2>(0.5), h, std::nullopt),
+                floor + 2, 1e-12);
+    EXPECT_TRUE(
+        std::isnan(water_level<2>(testing::points_at(x), VerticalLine<2>(1.3), h, std::nullopt)));
   }
 }
 

@@ -110,8 +110,8 @@ SparseMatrix wavy_surface(const Cloud<2> &cloud, double top, unsigned seed) {
   const double phase = 6.28 * uniform(engine);
   for (int i = 0; i < a.rows(); ++i) {
     const int first = a.row_start[i], last = a.row_start[i + 1];
-    const double above = cloud.position[i].y() - top + 8 +
-                         4 * std::sin(phase + 0.2 * cloud.position[i].x());
+    const double above =
+        cloud.position[i].y() - top + 8 + 4 * std::sin(phase + 0.2 * cloud.position[i].x());
     if (last - first < 3 || above < 0)
       continue;
     std::fill(a.value.begin() + first, a.value.begin() + last, 0.0);
@@ -126,8 +126,8 @@ SparseMatrix wavy_surface(const Cloud<2> &cloud, double top, unsigned seed) {
 // Where a cell holds a single row of the surface, smoothing may cancel its basis function; then the
 // coarse rows around it had diagonals of rounding error and the cycle amplified a hundredfold.
 TEST(LinearSolver, it_does_not_matter_where_the_surface_cuts_the_cells) {
-  const auto cloud = make_cloud<2>(
-      {.points = {50, 60}, .jitter = 0.4, .radius = 2.6, .top = Top::algebraic});
+  const auto cloud =
+      make_cloud<2>({.points = {50, 60}, .jitter = 0.4, .radius = 2.6, .top = Top::algebraic});
   const auto cells = testing::cells_of<2>(cloud.position, 2.0);
   for (unsigned seed = 1; seed <= 400; ++seed)
     EXPECT_LE(iterations(wavy_surface(cloud, 60, seed), cells), 8) << "seed " << seed;

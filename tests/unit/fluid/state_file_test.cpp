@@ -10,7 +10,6 @@
 namespace sluice::fluid {
 namespace {
 
-
 void advance(FluidSolver<2> &solver, int steps) {
   for (int n = 0; n < steps; ++n) {
     solver.begin_step(5e-4);
@@ -127,7 +126,8 @@ TEST(StateFile, ArraysOfUnequalLengthAreRefused) {
 
 TEST(StateFile, AFolderThatIsNotThereIsAnErrorAndLeavesNothing) {
   const TemporaryFolder folder;
-  EXPECT_THROW(write_state<2>(folder.path() / "none" / "state.h5", {FluidState<2>{}, 0, 1}), UserError);
+  EXPECT_THROW(write_state<2>(folder.path() / "none" / "state.h5", {FluidState<2>{}, 0, 1}),
+               UserError);
   EXPECT_TRUE(std::filesystem::is_empty(folder.path()));
 }
 

@@ -245,8 +245,8 @@ public:
     law.picard_tolerance = 1e-5;
     law.picard_passes = 200;
     // Each step divides what is left of the way to the steady state by 1 + dt nu pi^2, at least
-    // 1.25: twenty-five leave half a percent of it at most. The small step keeps the law's first look, at a fluid that
-    // the force has moved and the walls have not yet held, near the solution.
+    // 1.25: twenty-five leave half a percent of it at most. The small step keeps the law's first
+    // look, at a fluid that the force has moved and the walls have not yet held, near the solution.
     constexpr double dt = 0.05;
     constexpr int steps = 25;
     ViscousProblem<2> problem;
