@@ -182,13 +182,13 @@ template <int dim> void FluidSolver<dim>::predict_velocity() {
     if (knows_pressure)
       for_each_point(points.size(),
                      [&](int i) { predicted_[i] += projection_dt_ * unbalanced(i); });
-    build_viscous_rows(points, cloud_, params_.rheology, problem_, viscous_);
+    build_viscous_rows(points, cloud_, params_.rheology, problem_, viscous_.rows);
     const ViscousResult result =
         diffuse_velocity(points, walls, cloud_, params_.rheology, params_.density, projection_dt_,
                          predicted_, viscous_);
     report_.viscous_iterations = result.iterations;
     report_.viscous_passes = result.passes;
-    report_.viscous_rows = viscous_.rows;
+    report_.viscous_rows = viscous_.rows.count;
     if (knows_pressure)
       for_each_point(points.size(),
                      [&](int i) { predicted_[i] -= projection_dt_ * unbalanced(i); });

@@ -20,7 +20,7 @@ void build_rows(const FrozenCloud &frozen, ViscousProblem<2> &problem) {
   any.law = "power-law";
   PressureProblem<2> pressure;
   assemble_pressure_operators(frozen.points, frozen.cloud, {}, pressure);
-  build_viscous_rows(frozen.points, frozen.cloud, Rheology(any, 1), pressure, problem);
+  build_viscous_rows(frozen.points, frozen.cloud, Rheology(any, 1), pressure, problem.rows);
 }
 
 std::vector<Vec<2>> diffused(const FrozenCloud &frozen, std::vector<Vec<2>> u, double dt,
