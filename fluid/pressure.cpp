@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace sluice::fluid {
 
@@ -34,6 +35,10 @@ template <int dim> struct Stencil {
   int count;
   std::array<Neighbour<dim>, most_neighbours<dim>> neighbour;
 };
+
+template <int dim> double pressure_outside(int i, const PressureProblem<dim> &problem) {
+  return problem.surface_pressure.empty() ? 0.0 : problem.surface_pressure[i];
+}
 
 template <int dim> double reach_of_rows(const Cloud<dim> &cloud) {
   return wall_row_reach * cloud.spacing;
@@ -222,7 +227,8 @@ RowKind laplacian_row(const Stencil<dim> &s, const Points<dim> &points, const Cl
   return RowKind::plain;
 }
 
-/// Row of a surface point: pressure falls linearly to zero at the plane half a spacing outside,
+/// Row of a surface point: pressure falls linearly to zero (or to what acts outside, then p stands
+/// for the difference) at the plane half a spacing outside,
 /// p_i = a D/2 with the slope a fitted to the interior neighbours at depth d_j below the plane:
 /// p_i = D/2 sum w d_j p_j / sum w d_j^2. Exact for hydrostatic pressure; an M-matrix row.
 template <int dim>
@@ -347,7 +353,7 @@ public:
     Stencil<dim> s;
     gather(i, points_, cloud_, s);
     problem_.velocity_gradient[i] = velocity_gradient(s, velocity_, functional_of(s));
-    problem_.fluid_source[i] = s.open ? 0.0 : -source_of(s);
+    problem_.fluid_source[i] = s.open ? surface_source(s) : -source_of(s);
   }
 
 private:
@@ -361,6 +367,16 @@ private:
     Functionals<dim> functional = Functionals<dim>::Zero();
     functional.template topRows<dim>() = fluid_gradient(s);
     return functional;
+  }
+
+  // The row acts on the difference to the pressure outside.
+  double surface_source(const Stencil<dim> &s) const {
+    const double outside = pressure_outside(s.i, problem_);
+    if (outside == 0)
+      return 0;
+    const SparseMatrix &matrix = problem_.matrix;
+    const auto first = matrix.value.begin() + matrix.row_start[s.i];
+    return outside * std::accumulate(first, first + 1 + s.count, 0.0);
   }
 
   double source_of(const Stencil<dim> &s) const {
@@ -505,7 +521,7 @@ Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &c
     gradient += scaled * (functional.transpose() * quadratic_basis(n.q));
   });
   if (s.open)
-    gradient -= weight(s.open_side.norm()) * pressure[i] *
+    gradient -= weight(s.open_side.norm()) * (pressure[i] - pressure_outside(i, problem)) *
                 (functional.template topRows<dim>().transpose() * s.open_side);
   else
     for_each_wall_row(s, cloud, [&](int m, const Projection<dim> &) {

@@ -4,6 +4,7 @@
 #include "bridge/base/check.hpp"
 #include "fluid/parallel.hpp"
 #include "fluid/point_noise.hpp"
+#include "fluid/surface_stress.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -186,6 +187,7 @@ template <int dim> void FluidSolver<dim>::predict_velocity() {
     const ViscousResult result =
         diffuse_velocity(points, walls, cloud_, params_.rheology, params_.density, projection_dt_,
                          predicted_, viscous_);
+    surface_pressure(points, cloud_, viscosity(), predicted_, problem_.surface_pressure);
     report_.viscous_iterations = result.iterations;
     report_.viscous_passes = result.passes;
     report_.viscous_rows = viscous_.rows.count;
