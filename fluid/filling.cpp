@@ -270,14 +270,24 @@ private:
 
 // --- start ------------------------------------------------------------------------------------
 
-template <int dim> void disturb(double amplitude, std::vector<Vec<dim>> &points) {
+// Random displacements of every coordinate by up to `amplitude` [m]; next to a wall by up to half
+// of what keeps the point off it.
+template <int dim> void disturb(double amplitude, const Walls<dim> &walls, Points<dim> &points) {
   std::mt19937_64 random(1); // always the same points
   const auto between = [&] { // -1 and 1, the same on every platform
     return static_cast<double>(random() >> 11) * 0x1p-52 - 1;
   };
-  for (Vec<dim> &x : points)
+  const double reach = 4 * amplitude;
+  const Grid<dim> grid = grid_over(points, reach);
+  FaceGrid near;
+  find_near_faces(walls, grid, reach, near);
+  for (Vec<dim> &x : points.position) {
+    double largest = amplitude;
+    for (const Projection<dim> &p : project_on_walls(walls, near.near(grid.cell(x)), x, reach))
+      largest = std::min(largest, 0.5 * std::max(p.distance, 0.0) / std::sqrt(double{dim}));
     for (double &coordinate : x)
-      coordinate += amplitude * between();
+      coordinate += largest * between();
+  }
 }
 
 } // namespace
@@ -292,7 +302,7 @@ template <int dim> Points<dim> fill(const FluidParams<dim> &params, const Walls<
   points.position =
       params.is_flooded() ? Flood<dim>(params, walls).points() : points_in_outline(params);
   if (params.start_jitter > 0)
-    disturb<dim>(params.start_jitter * params.spacing, points.position);
+    disturb(params.start_jitter * params.spacing, walls, points);
   const std::size_t n = points.position.size();
   const Formula<dim> start_velocity(params.start_velocity);
   for (const Vec<dim> &x : points.position)

@@ -166,6 +166,14 @@ TEST(Scene, StartsWithTheVelocityOfItsFormulas) {
   }
 }
 
+TEST(Scene, JitterKeepsPointsInFrontOfObliqueWalls) {
+  const std::string text =
+      replaced(basin, "[0.5, 2], [0.5, 0.5], [0, 0.5], [0, 0]", "[-1, 1], [0, 0]");
+  const Scene<2> scene = scene_of(
+      text, {"fluid.start_jitter=0.25", "fluid.spacing_m=0.02", R"(fluid.wall_clearance=0.01)"});
+  EXPECT_GT(scene.initial.points.size(), 1000);
+}
+
 TEST(Scene, SaysWhereAFormulaCannotBeRead) {
   const std::string message =
       message_of([] { scene_of(basin, {R"(fluid.start_velocity_m_s=["2*y", "3*speed"])"}); });
