@@ -7,10 +7,27 @@
 #include "fluid/motion.hpp"
 #include "fluid/rheology.hpp"
 
+#include <algorithm>
+#include <array>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace sluice::fluid {
+
+/// Fields of the points that can be written for ParaView.
+inline constexpr std::array field_names{"pressure", "velocity", "viscosity",         "kind",
+                                        "id",       "volume",   "pressure_gradient", "shear_rate"};
+
+/// The first of `names` that is no field, "" if there is none.
+inline std::string unknown_field(const std::vector<std::string> &names) {
+  const auto unknown = std::find_if_not(names.begin(), names.end(), [](const std::string &name) {
+    return std::find(field_names.begin(), field_names.end(), name) != field_names.end();
+  });
+  return unknown == names.end() ? "" : *unknown;
+}
 
 /// Table [fluid].
 template <int dim> struct FluidParams {
@@ -34,6 +51,7 @@ template <int dim> struct FluidParams {
   bool free_surface = true;
   std::string coupled_walls = "move";
   std::string start_state;
+  std::vector<std::string> fields{"pressure", "velocity", "viscosity", "kind", "id", "volume"};
   int time_order = 1;
   double courant = 0;
   double pressure_tolerance = 1e-6;
@@ -45,6 +63,9 @@ template <int dim> struct FluidParams {
 
   /// The fluid is poured in at fill_from instead of filling `water`.
   bool is_flooded() const { return fill_from[0] < no_place; }
+  bool writes(std::string_view field) const {
+    return std::find(fields.begin(), fields.end(), field) != fields.end();
+  }
 
   template <class Reader> void describe(Reader &read) {
     int dimension = dim;
@@ -87,6 +108,10 @@ template <int dim> struct FluidParams {
     read("coupled_walls", coupled_walls, "what coupled walls do").one_of({"move", "stay"});
     read("start_state", start_state,
          "file fluid_state.h5 of a run to go on from, instead of filling water_m");
+    read("fields", fields, "of the points, written every case.output_interval_s")
+        .check(unknown_field(fields).empty(),
+               fmt::format("names '{}'; valid are {}", unknown_field(fields),
+                           fmt::join(field_names, ", ")));
     read("time_order", time_order,
          "1: each step by itself; 2: backward differences over two, viscosity with the last "
          "pressure")

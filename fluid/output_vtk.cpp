@@ -77,6 +77,26 @@ void add_vectors(vtkDataSetAttributes *data, const char *name,
   data->AddArray(array);
 }
 
+/// Adds the fields of the points that the case asks for.
+template <int dim> class ChosenFields {
+public:
+  ChosenFields(const FluidParams<dim> &params, vtkPointData *data, std::size_t n)
+      : params_(params), data_(data), n_(n) {}
+  template <class Array, class Value> void add(const char *name, Value &&value) const {
+    if (params_.writes(name))
+      add_array<Array>(data_, name, n_, value);
+  }
+  void add_vectors(const char *name, const std::vector<Vec<dim>> &vectors) const {
+    if (params_.writes(name))
+      fluid::add_vectors(data_, name, vectors);
+  }
+
+private:
+  const FluidParams<dim> &params_;
+  vtkPointData *data_;
+  std::size_t n_;
+};
+
 vtkNew<vtkCellArray> one_vertex_per_point(std::size_t n) {
   vtkNew<vtkCellArray> cells;
   for (std::size_t i = 0; i < n; ++i) {
@@ -96,20 +116,22 @@ template <int dim> void PointOutput::write(const FluidSolver<dim> &solver, doubl
   const bool is_frozen = cloud.kind.size() == n; // not before the first step
   data->SetPoints(to_vtk_points(points.position));
   data->SetVerts(one_vertex_per_point(n));
-  add_array<vtkFloatArray>(data->GetPointData(), "pressure", n,
-                           [&](std::size_t i) { return points.pressure[i]; });
-  add_array<vtkUnsignedCharArray>(data->GetPointData(), "kind", n, [&](std::size_t i) {
-    return is_frozen ? static_cast<int>(cloud.kind[i]) : 0;
-  });
-  add_array<vtkIntArray>(data->GetPointData(), "id", n,
-                         [&](std::size_t i) { return points.id[i]; });
-  add_array<vtkFloatArray>(data->GetPointData(), "volume", n,
-                           [&](std::size_t i) { return is_frozen ? cloud.cell_volume[i] : 0.0; });
-  add_vectors(data->GetPointData(), "velocity", points.velocity);
-  if (const auto viscosity = solver.viscosity();
-      viscosity.size() == n && !solver.params().rheology.is_newtonian())
-    add_array<vtkFloatArray>(data->GetPointData(), "viscosity", n,
-                             [&](std::size_t i) { return viscosity[i]; });
+  const ChosenFields<dim> fields(solver.params(), data->GetPointData(), n);
+  fields.template add<vtkFloatArray>("pressure", [&](std::size_t i) { return points.pressure[i]; });
+  fields.add_vectors("pressure_gradient", points.pressure_gradient);
+  fields.add_vectors("velocity", points.velocity);
+  fields.template add<vtkUnsignedCharArray>(
+      "kind", [&](std::size_t i) { return is_frozen ? static_cast<int>(cloud.kind[i]) : 0; });
+  fields.template add<vtkIntArray>("id", [&](std::size_t i) { return points.id[i]; });
+  fields.template add<vtkFloatArray>(
+      "volume", [&](std::size_t i) { return is_frozen ? cloud.cell_volume[i] : 0.0; });
+  const ViscousProblem<dim> &viscous = solver.viscous();
+  if (viscous.viscosity.size() == n && !solver.params().rheology.is_newtonian()) {
+    fields.template add<vtkFloatArray>("viscosity",
+                                       [&](std::size_t i) { return viscous.viscosity[i]; });
+    fields.template add<vtkFloatArray>(
+        "shear_rate", [&](std::size_t i) { return shear_rate(viscous.velocity_gradient[i]); });
+  }
   const auto file = next_file(solver.state.step);
   write_file(file, data);
   written(file, time);

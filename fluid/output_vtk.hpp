@@ -27,8 +27,9 @@ private:
   std::vector<std::pair<double, std::string>> entries_;
 };
 
-/// fluid_*.vtp: points with pressure [Pa], velocity [m/s], kind (0 interior, 1 surface, 2 thin),
-/// id, volume [m^2] and, where it varies, viscosity [Pa s].
+/// fluid_*.vtp: points with those of pressure [Pa], its gradient [Pa/m], velocity [m/s], kind (0
+/// interior, 1 surface, 2 thin), id, volume [m^dim], viscosity [Pa s] and shear rate [1/s] that the
+/// case asks for; the last two where the viscosity varies.
 class PointOutput : VtkSeries {
 public:
   explicit PointOutput(const std::filesystem::path &folder) : VtkSeries(folder, "fluid") {}

@@ -52,6 +52,7 @@ public:
   const PressureProblem<dim> &problem() const { return problem_; }
   /// Dynamic viscosity per point [Pa s]; empty in an inviscid fluid.
   std::span<const double> viscosity() const { return viscous_.viscosity; }
+  const ViscousProblem<dim> &viscous() const { return viscous_; }
   const StepReport<dim> &report() const { return report_; }
   const FluidParams<dim> &params() const { return params_; }
   double dt() const { return dt_; }
