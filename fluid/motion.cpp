@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 namespace sluice::fluid {
 
@@ -95,11 +96,15 @@ ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &wa
   return {static_cast<int>(sums[0]), static_cast<int>(sums[1]), Vec<dim>(&sums[2])};
 }
 
-template <int dim> double pace_of(const Points<dim> &points, double gravity, double spacing) {
-  if (gravity > 0)
-    return std::sqrt(gravity / spacing);
+template <int dim> Pace pace_of(const Points<dim> &points, double gravity, double spacing) {
+  if (gravity > 0) {
+    const double shortest_wave = std::sqrt(gravity / spacing);
+    return {shortest_wave, shortest_wave};
+  }
+  const int n = std::max(points.size(), 1);
   const double speed2 = sum(points.size(), [&](int i) { return points.velocity[i].squaredNorm(); });
-  return std::sqrt(speed2 / std::max(points.size(), 1)) / spacing;
+  const double speed = std::sqrt(speed2 / n), size = spacing * std::pow(n, 1.0 / dim);
+  return {speed / spacing, 2 * std::numbers::pi * speed / size};
 }
 
 template <int dim>
@@ -186,14 +191,14 @@ void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams
 }
 
 template void move_points(Points<2> &, double, double);
-template double pace_of(const Points<2> &, double, double);
+template Pace pace_of(const Points<2> &, double, double);
 template ContactCounts<2> keep_clear_of_walls(Points<2> &, const Walls<2> &, const MotionParams &,
                                               const Cloud<2> &);
 template void volume_restoring_divergence(const Points<2> &, const Cloud<2> &, const MotionParams &,
                                           double, std::span<double>);
 template void plan_shift(Points<2> &, const Cloud<2> &, const MotionParams &, MatView<2>, double);
 template void move_points(Points<3> &, double, double);
-template double pace_of(const Points<3> &, double, double);
+template Pace pace_of(const Points<3> &, double, double);
 template ContactCounts<3> keep_clear_of_walls(Points<3> &, const Walls<3> &, const MotionParams &,
                                               const Cloud<3> &);
 template void volume_restoring_divergence(const Points<3> &, const Cloud<3> &, const MotionParams &,

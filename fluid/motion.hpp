@@ -52,9 +52,18 @@ void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cl
                                  const MotionParams &params, double pace,
                                  std::span<double> divergence);
 
-/// How fast things happen at the scale of the points [1/s]: sqrt(g / spacing), the frequency of the
-/// shortest wave; without gravity the rms speed over the spacing.
-template <int dim> double pace_of(const Points<dim> &points, double gravity, double spacing);
+/// How fast things happen [1/s].
+struct Pace {
+  double points; // at the scale of the points
+  double volume; // at which volume errors come up
+};
+
+/// Next to air volume errors follow the shortest waves: both are their frequency sqrt(g / spacing).
+/// Without gravity: the rms speed over the spacing, and 2 pi times it over the size of the fluid, a
+/// turn of the largest eddy. A divergence that corrects the volume errors of single cells, which
+/// are there on every irregular cloud, at the pace of the points would give a velocity error of
+/// their size that no refinement takes away.
+template <int dim> Pace pace_of(const Points<dim> &points, double gravity, double spacing);
 
 /// Regularisation to be applied in the next move: towards the cell's centroid at a rate
 /// proportional to the local strain rate (along the surface only, at the free surface), and apart

@@ -67,7 +67,7 @@ template <int dim> void FluidSolver<dim>::end_step() {
       points.velocity[i] = predicted_[i] - factor * points.pressure_gradient[i];
     });
     damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient,
-                     params_.noise_damping * pace_, dt_, points.velocity);
+                     params_.noise_damping * pace_.points, dt_, points.velocity);
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
   });
   ++state.step;
@@ -202,7 +202,7 @@ template <int dim> void FluidSolver<dim>::assemble() {
   Points<dim> &points = state.points;
   timer("operators", [&] {
     target_divergence_.resize(points.size());
-    volume_restoring_divergence(points, cloud_, params_.motion, pace_, target_divergence_);
+    volume_restoring_divergence(points, cloud_, params_.motion, pace_.volume, target_divergence_);
     assemble_pressure_source(points, cloud_, pressure_params_, predicted_, target_divergence_,
                              projection_dt_, problem_);
     if (state.step > 0) // the first step has no pressure to judge by

@@ -73,7 +73,7 @@ private:
   PressureParams pressure_params_;
   double dt_ = 0;            // [s], of the step
   double projection_dt_ = 0; // [s], over which the forces of the step act on predicted_
-  double pace_ = 0;          // [1/s], of what happens at the scale of the points
+  Pace pace_{};              // [1/s]
   Cloud<dim> cloud_;
   PressureProblem<dim> problem_;
   ViscousProblem<dim> viscous_;

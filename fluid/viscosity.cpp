@@ -140,13 +140,15 @@ public:
     const auto neighbours = cloud_.neighbours.of(i);
     const int start = problem_.rows.start[i];
     const double mu = problem_.viscosity[i];
+    const ViscousRowForm form = problem_.rows.form[i];
     const bool is_open = cloud_.kind[i] != PointKind::interior;
     const Vec<dim> slope = is_open || is_uniform_ ? Vec<dim>(Vec<dim>::Zero()) : viscosity_slope(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       const int j = neighbours[k];
       const double mean = 0.5 * (mu + problem_.viscosity[j]);
-      if (is_open)
-        visit(j, Mat<dim>(mean * problem_.rows.block[start + k]));
+      if (form == ViscousRowForm::blocks)
+        visit(j, Mat<dim>(mean * problem_.rows.block[start + k] +
+                          outer(problem_.rows.gradient[start + k], slope)));
       else if (is_uniform_) // no gradients were made
         visit(j, Mat<dim>(mean * problem_.rows.laplacian[start + k] * Mat<dim>::Identity()));
       else
@@ -155,9 +157,10 @@ public:
     }
     for_each_wall(i, cloud_, [&](int m, const Projection<dim> &p) {
       const ViscousWallWeight<dim> &w = problem_.rows.wall_weights[cloud_.wall_slot[i]][m];
-      wall_visit(
-          wall_velocity(walls_, p),
-          Mat<dim>(w.viscosity * w.laplacian * Mat<dim>::Identity() + outer(w.gradient, slope)));
+      const Mat<dim> laplacian =
+          form == ViscousRowForm::blocks ? w.block : Mat<dim>(w.laplacian * Mat<dim>::Identity());
+      wall_visit(wall_velocity(walls_, p),
+                 Mat<dim>(w.viscosity * laplacian + outer(w.gradient, slope)));
     });
   }
 

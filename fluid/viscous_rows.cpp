@@ -63,17 +63,21 @@ public:
 
   Kind build(int i) const {
     const Row row = gather(i);
+    rows_.form[i] = ViscousRowForm::blocks;
     if (cloud_.kind[i] == PointKind::surface && surface_row(row))
       return Kind::surface;
     if (cloud_.kind[i] != PointKind::interior) {
       pair_row(row);
       return Kind::pairs;
     }
+    if (slides(row) && slip_row(row))
+      return Kind::quadratic;
+    rows_.form[i] = ViscousRowForm::scalar;
     if (!row.walls && pressure_.row_kind[i] == RowKind::quadratic) {
       pressures_row(row);
       return Kind::quadratic;
     }
-    if (slides(row) ? quadratic_row<WallRows::slip>(row) : quadratic_row<WallRows::none>(row))
+    if (!slides(row) && quadratic_row(row))
       return Kind::quadratic;
     linear_row(row);
     return Kind::linear;
@@ -120,17 +124,69 @@ private:
       }
   }
 
-  enum class WallRows { none, slip };
+  static bool is_gliding(const Projection<dim> &p) { return p.slips && !p.at_edge; }
   bool slides(const Row &row) const {
-    return row.walls && std::any_of(row.walls->begin(), row.walls->end(),
-                                    [](const Projection<dim> &p) { return p.slips; });
+    return row.walls && std::any_of(row.walls->begin(), row.walls->end(), is_gliding);
   }
 
-  // A wall that slips holds no velocity; its row says that none changes across it.
-  void add_slip_rows(const Row &row, QuadraticFit<dim> &fit) const {
+  // Does the wall's velocity hold for the component along e? A no-slip wall's for all, that of one
+  // that slips for what crosses it.
+  static bool holds_along(const Projection<dim> &p, const Vec<dim> &e) {
+    constexpr double closer_to_normal = 0.7;
+    return !p.slips || std::abs(p.normal.dot(e)) > closer_to_normal;
+  }
+
+  /// One quadratic fit for the component along the normal of the first wall that slips, and one for
+  /// each along it.
+  bool slip_row(const Row &row) const {
+    std::fill_n(row.block, row.neighbours.size(), Mat<dim>(Mat<dim>::Zero()));
+    for (int m = 0; m < row.walls->count; ++m)
+      (*row.wall)[m] = {};
+    const Vec<dim> n = std::find_if(row.walls->begin(), row.walls->end(), is_gliding)->normal;
+    if (!add_component(row, n))
+      return false;
+    for (const Vec<dim> &t : tangents_of(n))
+      if (!add_component(row, t))
+        return false;
+    set_linear_gradient(row);
+    return true;
+  }
+
+  // Adds the Laplacian of the component along e to the row's blocks.
+  bool add_component(const Row &row, const Vec<dim> &e) const {
+    QuadraticFit<dim> fit;
+    for (const int j : row.neighbours) {
+      const Vec<dim> q = scaled(row.i, points_.position[j]);
+      fit.add_neighbour(q, weight_at(q));
+    }
+    const auto for_each_held = [&](auto &&visit) {
+      for (int m = 0; m < row.walls->count; ++m)
+        if (const Projection<dim> &p = row.walls->projection[m]; holds_along(p, e))
+          visit(m, scaled(row.i, p.point));
+    };
+    for_each_held(
+        [&](int, const Vec<dim> &q) { fit.add_neighbour(q, wall_weight * weight_at(q)); });
     for (const Projection<dim> &p : *row.walls)
-      if (const Vec<dim> q = scaled(row.i, p.point); p.slips && !p.at_edge)
+      if (const Vec<dim> q = scaled(row.i, p.point); is_gliding(p) && !holds_along(p, e))
         fit.add_row(normal_derivative(q, p.normal), weight_at(q));
+    if (!fit.factorise())
+      return false;
+    const Basis<dim> laplacian = fit.solve(laplacian_functional<dim>(cloud_.radius));
+    const Mat<dim> along = outer(e, e);
+    double negative = 0, positive = 0;
+    const auto add = [&](Mat<dim> &block, const Vec<dim> &q, double w) {
+      const double value = w * laplacian.dot(quadratic_basis(q));
+      block += value * along;
+      (value < 0 ? negative : positive) += std::abs(value);
+    };
+    for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
+      const Vec<dim> q = scaled(row.i, points_.position[row.neighbours[k]]);
+      add(row.block[k], q, weight_at(q));
+    }
+    for_each_held([&](int m, const Vec<dim> &q) {
+      add((*row.wall)[m].block, q, wall_weight * weight_at(q));
+    });
+    return !has_wrong_signs(negative, positive);
   }
 
   void pressures_row(const Row &row) const {
@@ -147,12 +203,10 @@ private:
     }
   }
 
-  template <WallRows wall_rows> bool quadratic_row(const Row &row) const {
+  bool quadratic_row(const Row &row) const {
     QuadraticFit<dim> fit;
     const auto add = [&](std::size_t, const Vec<dim> &q, double w) { fit.add_neighbour(q, w); };
     for_each(row, add, add);
-    if constexpr (wall_rows == WallRows::slip)
-      add_slip_rows(row, fit);
     if (!fit.factorise())
       return false;
     const double h = cloud_.radius;
@@ -316,7 +370,7 @@ private:
               q2 > 0 ? Mat<dim>(scale * w / q2 * outer(q, q)) : Mat<dim>(Mat<dim>::Zero());
         },
         [&](int m, const Vec<dim> &, double w) {
-          (*row.wall)[m].laplacian = scale * w / (dim + 2);
+          (*row.wall)[m].block = scale * w / (dim + 2) * Mat<dim>::Identity();
         });
     set_linear_gradient(row);
   }
@@ -366,6 +420,7 @@ void build_viscous_rows(const Points<dim> &points, const Cloud<dim> &cloud,
   rows.start[0] = 0;
   for (int i = 0; i < n; ++i)
     rows.start[i + 1] = rows.start[i] + cloud.neighbours.count[i];
+  rows.form.resize(n);
   rows.laplacian.resize(rows.start[n]);
   rows.gradient.resize(rows.start[n]);
   rows.block.resize(rows.start[n]);

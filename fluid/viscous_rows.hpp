@@ -2,7 +2,9 @@
 // Rows of the viscous operator of a frozen cloud: what each neighbour's and each wall's velocity
 // weighs, before any viscosity is known.
 //
-//   interior  quadratic fit with the walls as data (no-slip): Laplacian and gradient,
+//   interior  quadratic fit with the walls as data (no-slip): Laplacian and gradient; next to walls
+//             that slip one fit per direction: the wall's velocity holds for the component along
+//             its normal, no change across it for the others,
 //   surface   quadratic fit of all components together that holds the traction-free conditions
 //             t . 2E n = 0 and div u = 0 half a spacing outside the point,
 //   thin      pairs of points act along their line: momentum and angular momentum are kept, no
@@ -30,18 +32,23 @@ struct ViscousRowCounts {
   int pairs = 0;     // thin, and fallback of the surface: central forces between pairs
 };
 
+/// Whether one number per neighbour serves all components.
+enum class ViscousRowForm : std::uint8_t { scalar, blocks };
+
 /// Weights of one wall projection in the rows of its point.
 template <int dim> struct ViscousWallWeight {
-  double laplacian = 0;                 // [1/m^2]
+  double laplacian = 0;                 // [1/m^2], scalar rows
+  Mat<dim> block = Mat<dim>::Zero();    // [1/m^2], rows of blocks
   Vec<dim> gradient = Vec<dim>::Zero(); // [1/m]
   double viscosity = 0;                 // mean of the point's and the wall's [Pa s]
 };
 
 template <int dim> struct ViscousRows {
-  std::vector<int> start;         // of each point's neighbours in the three arrays below
+  std::vector<int> start; // of each point's neighbours in the three arrays below
+  std::vector<ViscousRowForm> form;
   std::vector<double> laplacian;  // [1/m^2], scalar rows
   std::vector<Vec<dim>> gradient; // [1/m]
-  std::vector<Mat<dim>> block;    // [1/m^2], open rows: of the components together
+  std::vector<Mat<dim>> block;    // [1/m^2], rows of blocks: of the components together
   std::vector<std::array<ViscousWallWeight<dim>, most_projections<dim>>>
       wall_weights; // per wall slot
   ViscousRowCounts count;
