@@ -23,6 +23,7 @@ template <int dim> struct Points {
   std::vector<Vec<dim>> shift_velocity;    // [m/s], change of velocity along that shift
   std::vector<double> pressure;            // [Pa], mean over the last step
   std::vector<Vec<dim>> pressure_gradient; // [Pa/m], of the last step
+  std::vector<double> surface_pressure;    // [Pa], outside of surface points; elsewhere 0
   std::vector<std::int32_t> id;            // stays with the point for its life
   std::vector<SurfaceMemory> at_surface;   // in the last step
 
@@ -38,6 +39,7 @@ template <class AnyPoints, class Body> void for_each_array(AnyPoints &points, Bo
   body("shift_velocity", points.shift_velocity);
   body("pressure", points.pressure);
   body("pressure_gradient", points.pressure_gradient);
+  body("surface_pressure", points.surface_pressure);
   body("id", points.id);
   body("at_surface", points.at_surface);
 }

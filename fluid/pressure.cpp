@@ -36,10 +36,6 @@ template <int dim> struct Stencil {
   std::array<Neighbour<dim>, most_neighbours<dim>> neighbour;
 };
 
-template <int dim> double pressure_outside(int i, const PressureProblem<dim> &problem) {
-  return problem.surface_pressure.empty() ? 0.0 : problem.surface_pressure[i];
-}
-
 template <int dim> double reach_of_rows(const Cloud<dim> &cloud) {
   return wall_row_reach * cloud.spacing;
 }
@@ -371,7 +367,7 @@ private:
 
   // The row acts on the difference to the pressure outside.
   double surface_source(const Stencil<dim> &s) const {
-    const double outside = pressure_outside(s.i, problem_);
+    const double outside = points_.surface_pressure[s.i];
     if (outside == 0)
       return 0;
     const SparseMatrix &matrix = problem_.matrix;
@@ -509,9 +505,12 @@ void set_wall_velocity(const Walls<dim> &walls, const Cloud<dim> &cloud,
   });
 }
 
-template <int dim>
-Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
-                           const PressureProblem<dim> &problem, std::span<const double> pressure) {
+namespace {
+
+/// grad p at a point with the given data at its walls: datum(m, projection) [Pa/m].
+template <int dim, class Datum>
+Vec<dim> gradient_with(Datum &&datum, int i, const Points<dim> &points, const Cloud<dim> &cloud,
+                       const PressureProblem<dim> &problem, std::span<const double> pressure) {
   Stencil<dim> s;
   gather(i, points, cloud, s);
   const auto &functional = problem.gradient[i];
@@ -521,14 +520,33 @@ Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &c
     gradient += scaled * (functional.transpose() * quadratic_basis(n.q));
   });
   if (s.open)
-    gradient -= weight(s.open_side.norm()) * (pressure[i] - pressure_outside(i, problem)) *
+    gradient -= weight(s.open_side.norm()) * (pressure[i] - points.surface_pressure[i]) *
                 (functional.template topRows<dim>().transpose() * s.open_side);
   else
-    for_each_wall_row(s, cloud, [&](int m, const Projection<dim> &) {
-      const WallRow<dim> &wall = problem.wall_rows[cloud.wall_slot[i]][m];
-      gradient += wall.datum * wall.gradient;
+    for_each_wall_row(s, cloud, [&](int m, const Projection<dim> &p) {
+      gradient += datum(m, p) * problem.wall_rows[cloud.wall_slot[i]][m].gradient;
     });
   return gradient;
+}
+
+} // namespace
+
+template <int dim>
+Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
+                           const PressureProblem<dim> &problem, std::span<const double> pressure) {
+  const auto datum = [&](int m, const Projection<dim> &) {
+    return problem.wall_rows[cloud.wall_slot[i]][m].datum;
+  };
+  return gradient_with(datum, i, points, cloud, problem, pressure);
+}
+
+template <int dim>
+Vec<dim> carried_pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
+                                   const PressureProblem<dim> &problem) {
+  const auto datum = [&](int, const Projection<dim> &p) {
+    return p.normal.dot(points.pressure_gradient[i]);
+  };
+  return gradient_with(datum, i, points, cloud, problem, points.pressure);
 }
 
 template void assemble_pressure_operators(const Points<2> &, const Cloud<2> &,
@@ -540,6 +558,10 @@ template int release_tension(Points<2> &, const Walls<2> &, const PressureParams
                              std::span<const double>, double, Cloud<2> &, PressureProblem<2> &);
 template void set_wall_velocity(const Walls<2> &, const Cloud<2> &, const PressureParams &, double,
                                 PressureProblem<2> &);
+template Vec<2> carried_pressure_gradient(int, const Points<2> &, const Cloud<2> &,
+                                          const PressureProblem<2> &);
+template Vec<3> carried_pressure_gradient(int, const Points<3> &, const Cloud<3> &,
+                                          const PressureProblem<3> &);
 template Vec<2> pressure_gradient(int, const Points<2> &, const Cloud<2> &,
                                   const PressureProblem<2> &, std::span<const double>);
 template void assemble_pressure_operators(const Points<3> &, const Cloud<3> &,

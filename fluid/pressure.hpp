@@ -2,7 +2,7 @@
 // The pressure that makes the velocity solenoidal, on a frozen cloud.
 //
 //   interior  L p = rho/dt (D u* - theta),   n . grad p = rho/dt n . (u* - u_wall) at walls,
-//   surface   p falls linearly to surface_pressure half a spacing outside the outermost points,
+//   surface   p falls linearly to what acts outside half a spacing off the outermost points,
 //   after     u = u* - dt/rho grad p.
 //
 // D sees the fluid alone; the jump at a wall is counted once, in the Neumann datum. A coupling
@@ -46,7 +46,6 @@ template <int dim> struct PressureProblem {
   std::vector<Functionals<dim>> gradient; // of the derivatives per point
   std::vector<RowKind> row_kind;
   std::vector<std::array<WallRow<dim>, most_projections<dim>>> wall_rows; // per wall slot
-  std::vector<double> surface_pressure; // [Pa], of the air and the normal viscous stress; empty: 0
   std::vector<Mat<dim>> velocity_gradient; // of u* [1/s], row: component
   RowCounts rows;
   bool has_open_point = false; // else pressure is known up to a constant
@@ -90,5 +89,13 @@ void set_wall_velocity(const Walls<dim> &walls, const Cloud<dim> &cloud,
 template <int dim>
 Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
                            const PressureProblem<dim> &problem, std::span<const double> pressure);
+
+/// The same of the pressure that the points carry from the last step, with the operators of this
+/// one; the data at walls are those of the last gradient. What a step takes off a velocity by this
+/// gradient and gives back by the next differs by the change of the pressure alone, not by that of
+/// the operators.
+template <int dim>
+Vec<dim> carried_pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
+                                   const PressureProblem<dim> &problem);
 
 } // namespace sluice::fluid

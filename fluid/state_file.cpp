@@ -14,7 +14,7 @@ namespace sluice::fluid {
 namespace {
 
 constexpr const char *format_name = "sluice-fluid-state";
-constexpr int format_version = 1;
+constexpr int format_version = 2;
 
 // A handle of the library, closed at the end of its scope.
 class Handle {

@@ -170,30 +170,37 @@ template <int dim> void FluidSolver<dim>::extrapolate_velocity() {
   });
 }
 
-// Viscosity acts on a velocity that knows the pressure: in the first-order scheme that of water at
-// rest, so that it stays at rest; in the second-order one that of the last step.
-template <int dim> void FluidSolver<dim>::predict_velocity() {
+// Velocity that gravity and the last pressure add in the step: what viscosity has to know, so that
+// water at rest stays so and a surface point does not fall freely before it is held. In a step of
+// first order without stiffness it makes a difference of second order, and is left out.
+template <int dim> void FluidSolver<dim>::push_by_known_forces() {
   const Points<dim> &points = state.points;
+  push_.assign(points.size(), Vec<dim>::Zero());
+  if (params_.time_order == 1 &&
+      is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
+    return;
+  for_each_point(points.size(), [&](int i) {
+    const Vec<dim> gradient = carried_pressure_gradient(i, points, cloud_, problem_);
+    push_[i] = projection_dt_ * (params_.gravity - gradient / params_.density);
+    predicted_[i] += push_[i];
+  });
+}
+
+template <int dim> void FluidSolver<dim>::predict_velocity() {
+  Points<dim> &points = state.points;
   extrapolate_velocity();
-  const bool knows_pressure = params_.time_order == 2;
-  const auto unbalanced = [&](int i) -> Vec<dim> {
-    return params_.gravity - points.pressure_gradient[i] / params_.density;
-  };
   if (!params_.rheology.is_inviscid()) {
-    if (knows_pressure)
-      for_each_point(points.size(),
-                     [&](int i) { predicted_[i] += projection_dt_ * unbalanced(i); });
+    push_by_known_forces();
     build_viscous_rows(points, cloud_, params_.rheology, problem_, viscous_.rows);
     const ViscousResult result =
         diffuse_velocity(points, walls, cloud_, params_.rheology, params_.density, projection_dt_,
                          predicted_, viscous_);
-    surface_pressure(points, cloud_, viscosity(), predicted_, problem_.surface_pressure);
+    update_surface_pressure(cloud_, viscosity(), predicted_, projection_dt_ / params_.density,
+                            points);
     report_.viscous_iterations = result.iterations;
     report_.viscous_passes = result.passes;
     report_.viscous_rows = viscous_.rows.count;
-    if (knows_pressure)
-      for_each_point(points.size(),
-                     [&](int i) { predicted_[i] -= projection_dt_ * unbalanced(i); });
+    for_each_point(points.size(), [&](int i) { predicted_[i] -= push_[i]; });
   }
   for_each_point(points.size(), [&](int i) { predicted_[i] += projection_dt_ * params_.gravity; });
 }

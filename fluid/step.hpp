@@ -66,6 +66,7 @@ private:
   double energy_of_point(const Vec<dim> &u, const Vec<dim> &x) const;
   void freeze_cloud();
   void extrapolate_velocity();
+  void push_by_known_forces();
   void predict_velocity();
   void assemble();
 
@@ -78,6 +79,7 @@ private:
   PressureProblem<dim> problem_;
   ViscousProblem<dim> viscous_;
   std::vector<Vec<dim>> predicted_; // u* [m/s]
+  std::vector<Vec<dim>> push_;      // [m/s]
   std::vector<double> target_divergence_;
   ScaledMatrix scaled_;
   Multigrid multigrid_;

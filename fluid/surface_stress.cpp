@@ -5,7 +5,10 @@
 #include "fluid/parallel.hpp"
 #include "fluid/weights.hpp"
 
+#include <Eigen/Sparse>
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 namespace sluice::fluid {
 
@@ -28,40 +31,93 @@ double contraction(int i, const Points<dim> &points, const Cloud<dim> &cloud,
   return n.dot(gradient * n) - gradient.trace();
 }
 
+// Sum of w |q|^2 over the surface points around one, on a straight surface of a lattice.
+template <int dim> double moment_along_surface() {
+  double sum = 0;
+  constexpr int reach = 3, across = dim == 3 ? reach : 0;
+  static_assert(reach >= kernel_radius_ratio);
+  for (int j = -across; j <= across; ++j)
+    for (int i = -reach; i <= reach; ++i) {
+      const double q = std::hypot(i, j) / kernel_radius_ratio;
+      sum += q < 1 ? weight(q) * q * q : 0.0;
+    }
+  return sum;
+}
+
+/// The surface points of a cloud, numbered on their own.
+struct SurfacePoints {
+  std::vector<int> point;  // of each number
+  std::vector<int> number; // of each point, -1: not at the surface
+};
+
+template <int dim> SurfacePoints surface_points(const Cloud<dim> &cloud) {
+  SurfacePoints surface;
+  surface.number.assign(cloud.kind.size(), -1);
+  for (int i = 0; i < static_cast<int>(cloud.kind.size()); ++i)
+    if (cloud.kind[i] == PointKind::surface) {
+      surface.number[i] = static_cast<int>(surface.point.size());
+      surface.point.push_back(i);
+    }
+  return surface;
+}
+
+/// 1 - 2 factor div_s mu grad_s on the surface points; symmetric and positive definite.
+template <int dim>
+Eigen::SparseMatrix<double> surface_diffusion(const Points<dim> &points, const Cloud<dim> &cloud,
+                                              std::span<const double> viscosity, double factor,
+                                              const SurfacePoints &surface) {
+  const double scale =
+      4 * (dim - 1) * factor / (moment_along_surface<dim>() * cloud.radius * cloud.radius);
+  std::vector<Eigen::Triplet<double>> entries;
+  const auto add = [&](int row, int column, double value) {
+    entries.emplace_back(row, column, value);
+  };
+  for (int a = 0; a < static_cast<int>(surface.point.size()); ++a) {
+    const int i = surface.point[a];
+    add(a, a, 1);
+    for (const int j : cloud.neighbours.of(i)) {
+      const int b = surface.number[j];
+      if (b <= a) // each pair once: also where one list has been cut short
+        continue;
+      const double q = (points.position[j] - points.position[i]).norm() / cloud.radius;
+      const double c = scale * weight(std::min(q, 1.0)) * 0.5 * (viscosity[i] + viscosity[j]);
+      add(a, a, c);
+      add(b, b, c);
+      add(a, b, -c);
+      add(b, a, -c);
+    }
+  }
+  const int n = static_cast<int>(surface.point.size());
+  Eigen::SparseMatrix<double> matrix(n, n);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
+}
+
 } // namespace
 
 template <int dim>
-void surface_pressure(const Points<dim> &points, const Cloud<dim> &cloud,
-                      std::span<const double> viscosity, VecView<dim> velocity,
-                      std::vector<double> &pressure) {
-  pressure.clear();
-  if (viscosity.empty())
-    return;
-  const auto is_at_surface = [&](int i) { return cloud.kind[i] == PointKind::surface; };
-  std::vector<double> stress(points.size(), 0.0);
-  for_each_point(points.size(), [&](int i) {
-    if (is_at_surface(i))
-      stress[i] = 2 * viscosity[i] * contraction(i, points, cloud, velocity);
+void update_surface_pressure(const Cloud<dim> &cloud, std::span<const double> viscosity,
+                             VecView<dim> velocity, double factor, Points<dim> &points) {
+  const SurfacePoints surface = surface_points(cloud);
+  const int n = static_cast<int>(surface.point.size());
+  Eigen::VectorXd defect(n);
+  for_each_index(n, [&](int a) {
+    const int i = surface.point[a];
+    defect[a] =
+        2 * viscosity[i] * contraction(i, points, cloud, velocity) - points.surface_pressure[i];
   });
-  pressure.assign(points.size(), 0.0);
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(
+      surface_diffusion(points, cloud, viscosity, factor, surface));
+  const Eigen::VectorXd change = solver.solve(defect);
   for_each_point(points.size(), [&](int i) {
-    if (!is_at_surface(i))
-      return;
-    double sum = stress[i], total = 1;
-    for (const int j : cloud.neighbours.of(i))
-      if (is_at_surface(j)) {
-        const double w =
-            weight(std::min((points.position[j] - points.position[i]).norm() / cloud.radius, 1.0));
-        sum += w * stress[j];
-        total += w;
-      }
-    pressure[i] = sum / total;
+    const int a = surface.number[i];
+    points.surface_pressure[i] = a < 0 ? 0 : points.surface_pressure[i] + change[a];
   });
 }
 
-template void surface_pressure(const Points<2> &, const Cloud<2> &, std::span<const double>,
-                               VecView<2>, std::vector<double> &);
-template void surface_pressure(const Points<3> &, const Cloud<3> &, std::span<const double>,
-                               VecView<3>, std::vector<double> &);
+template void update_surface_pressure(const Cloud<2> &, std::span<const double>, VecView<2>, double,
+                                      Points<2> &);
+template void update_surface_pressure(const Cloud<3> &, std::span<const double>, VecView<3>, double,
+                                      Points<3> &);
 
 } // namespace sluice::fluid

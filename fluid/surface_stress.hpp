@@ -6,19 +6,22 @@
 #include "fluid/points.hpp"
 
 #include <span>
-#include <vector>
 
 namespace sluice::fluid {
 
-/// Pressure of the fluid at its surface [Pa], per point; zero except at surface points. In a
-/// solenoidal flow n . E n is the rate at which the surface contracts: the gradient along the
-/// surface decides, which both sides of a fit with neighbours on one side only hold well. Averaged
-/// over the surface points within the kernel's radius: what is as short as a spacing would feed on
-/// itself, since the pressure acts a step after the viscosity. `viscosity` [Pa s] per point;
-/// without one the result is empty.
+/// Sets points.surface_pressure [Pa] of the surface points, and zero elsewhere. In a solenoidal
+/// flow n . E n is the rate at which the surface contracts, which a fit with neighbours on one side
+/// only holds well. The pressure that follows from a velocity u* changes that velocity in the same
+/// step: a surface wave of number k by -2 nu k^2 dt of it. Taken from u* alone the change
+/// overshoots where nu dt k^2 > 1/2; so the change of p against the last step solves
+///
+///   (1 - 2 dt div_s nu grad_s) dp = 2 mu n . E(u*) n - p_last
+///
+/// along the surface, by which p fits the velocity that it leads to (derived here for waves that
+/// are short against the depth). `viscosity` [Pa s] per point, `velocity` u* [m/s], `factor`: step
+/// over density [s m^3/kg].
 template <int dim>
-void surface_pressure(const Points<dim> &points, const Cloud<dim> &cloud,
-                      std::span<const double> viscosity, VecView<dim> velocity,
-                      std::vector<double> &pressure);
+void update_surface_pressure(const Cloud<dim> &cloud, std::span<const double> viscosity,
+                             VecView<dim> velocity, double factor, Points<dim> &points);
 
 } // namespace sluice::fluid

@@ -364,6 +364,14 @@ double relative_change(const std::vector<double> &now, const std::vector<double>
 
 } // namespace
 
+bool is_explicit(const Rheology &rheology, double density, double dt, double spacing) {
+  if (!rheology.is_newtonian())
+    return false;
+  double viscosity = 0;
+  rheology.with_law([&](const auto &law) { viscosity = law(0); });
+  return dt * viscosity / density < explicit_limit * spacing * spacing;
+}
+
 template <int dim> double shear_rate(const Mat<dim> &gradient) {
   return (gradient + gradient.transpose()).norm() / std::sqrt(2.0);
 }

@@ -35,6 +35,9 @@ template <int dim> struct ViscousProblem {
   std::vector<double> source, solution, previous; // [m/s], interleaved
 };
 
+/// Whether a Newtonian fluid's viscosity [Pa s] is so low that its step is explicit.
+bool is_explicit(const Rheology &rheology, double density, double dt, double spacing);
+
 struct ViscousResult {
   int iterations = 0; // of the linear solver
   int passes = 0;     // over the viscosity law; 0: explicit
