@@ -136,12 +136,6 @@ def energy_growth(run, until):
     return float(total.max() / total[0] - 1)
 
 
-def volume_drift(run):
-    """Largest |area inside the envelope over that of the points - 1| of the run."""
-    series = run.series("fluid.csv")
-    return float(np.abs(series["volume_m2"] / series["point_volume_m2"] - 1).max())
-
-
 def time_at(curve, value):
     """When a growing curve first reaches `value`, by linear interpolation."""
     k = int(np.argmax(curve.value >= value))
@@ -167,6 +161,12 @@ def arrival(curve):
 def mean_between(curve, start, end):
     times = np.linspace(start, end, 200)
     return float(np.mean(curve.at(times)))
+
+
+def crossing_band():
+    """Fastest and slowest experiment from one to the other place of CROSSED, and its uncertainty."""
+    measured = [crossing(curve) for curve in measured_fronts().values()]
+    return min(measured) - CROSSING_UNCERTAINTY, max(measured) + CROSSING_UNCERTAINTY
 
 
 def simulated_front():

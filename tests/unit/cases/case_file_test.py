@@ -28,7 +28,9 @@ name = "side"
 points_m = [[0, 1], [0, 0]]
 """
 
-COMPUTED = {"dam-break": ("dam", "Dam"), "hydrostatic-tank": ("tank", "Tank")}
+COMPUTED = {"cavity-skewed-power-law": ("cavity", "Cavity"),
+            "dam-break": ("dam", "Dam"), "hydrostatic-tank": ("tank", "Tank"),
+            "oscillating-drop": ("drop", "Drop"), "viscous-collapse": ("current", "Current")}
 
 
 @dataclass(frozen=True)
