@@ -40,6 +40,8 @@ def main(documentation, case_file, runs_of, arguments=None):
     case = tomllib.loads(case_file.read_text())
     for text in options.overrides:
         set_key(case, text)
+    runs = runs_of(case)
+    refuse_what_follows(options.overrides, runs)
     options.out.mkdir(parents=True, exist_ok=True)
     shutil.copy(case_file, options.out / "case.toml")
     summary = {"case": case["case"]["name"], "case_file": str(case_file),
@@ -47,7 +49,7 @@ def main(documentation, case_file, runs_of, arguments=None):
                "started": time.strftime("%Y-%m-%dT%H:%M:%S%z"),
                "threads": int(os.environ.get("OMP_NUM_THREADS", os.cpu_count() or 1))}
     started, status = time.monotonic(), 0
-    for name, overrides in runs_of(case).items():
+    for name, overrides in runs.items():
         print(f"{name}:", flush=True)
         status = run_one(options, case_file, name, overrides)
         if status != 0:
@@ -56,6 +58,19 @@ def main(documentation, case_file, runs_of, arguments=None):
     summary |= {"completed": status == 0, "wall_time_s": time.monotonic() - started}
     (options.out / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     return status
+
+
+def key_of(override):
+    return override.partition("=")[0].strip()
+
+
+def refuse_what_follows(overrides, runs):
+    """SystemExit when an override is a key that every run sets for itself."""
+    own = {key_of(text) for texts in runs.values() for text in texts}
+    for text in overrides:
+        if key_of(text) in own:
+            raise SystemExit(f"solve: {key_of(text)} follows from [parameters] in this case; "
+                             "set those instead")
 
 
 def run_one(options, case_file, name, overrides):

@@ -16,6 +16,7 @@ for name in ("dam-break", "hydrostatic-tank", "taylor-green", "rotating-square",
 import channel  # noqa: E402
 import current  # noqa: E402
 import dam  # noqa: E402
+import fluid_runs  # noqa: E402
 import drop  # noqa: E402
 import square  # noqa: E402
 import surface  # noqa: E402
@@ -145,6 +146,15 @@ class ChannelTest(unittest.TestCase):
     def test_a_newtonian_profile_is_a_parabola(self):
         y = np.linspace(0, 1, 11)
         np.testing.assert_allclose(channel.exact_velocity(1, y), 3 * y**2 - 2 * y, atol=1e-12)
+
+
+class RunsTest(unittest.TestCase):
+    RUNS = {"n20": ["fluid.spacing_m=0.05"], "n40": ["fluid.spacing_m=0.025"]}
+
+    def test_what_every_run_sets_for_itself_cannot_be_overridden(self):
+        fluid_runs.refuse_what_follows(["fluid.time_order=1"], self.RUNS)
+        with self.assertRaisesRegex(SystemExit, r"fluid.spacing_m follows from \[parameters\]"):
+            fluid_runs.refuse_what_follows(["fluid.spacing_m = 0.1"], self.RUNS)
 
 
 class SurfaceTest(unittest.TestCase):
