@@ -85,7 +85,8 @@ class RunFolder:
         return (self.path / name).is_file()
 
     def collection(self, part):
-        """[(time, file)] of PART.pvd, sorted by time; empty when it was not written."""
+        """[(time, file)] of PART.pvd, sorted by time; empty when it was not written. PART may lie in
+        a folder below, as of one of several runs."""
         file = self.path / f"{part}.pvd"
         if not file.is_file():
             return []
@@ -93,7 +94,7 @@ class RunFolder:
             root = ElementTree.parse(file).getroot()
         except ElementTree.ParseError as error:
             raise RunError(f"{file}: not XML: {error}") from None
-        entries = [(float(e.get("timestep")), self.path / e.get("file"))
+        entries = [(float(e.get("timestep")), file.parent / e.get("file"))
                    for e in root.iter("DataSet")]
         return sorted(entry for entry in entries if entry[1].is_file())
 

@@ -33,20 +33,25 @@ def number(value):
     return str(value)
 
 
-def write(run, outcome, checks, warnings, comparison):
+def write(run, verdict):
+    """summary.md: of a coupled run, of the fluid alone, or of a solver of its own."""
+    checks = [[c.what, c.value, c.band, "ok" if c.holds else "outside"] for c in verdict.checks]
+    results = verdict.tables + [(["check", "value", "band", ""], checks)]
     text = "\n\n".join(part for part in [
-        f"# {run.summary['case']}: {outcome}",
-        what_was_run(run),
-        "## Results\n\n" + comparison,
-        markdown_table(["check", "value", "band", ""],
-                       [[c.what, c.value, c.band, "ok" if c.holds else "outside"]
-                        for c in checks]),
-        "## Notes\n\n" + "\n".join(f"- {w}" for w in warnings) if warnings else "",
-        "## Counts\n\n" + keyed_table(run, "count", COUNTS),
-        "## Balances\n\n" + keyed_table(run, "largest relative difference or drift", BALANCES),
-        "## Costs\n\n" + costs(run),
+        f"# {run.summary.get('case', run.path.name)}: {verdict.outcome()}",
+        what_was_run(run) if "case_file" in run.summary else "",
+        "## Results",
+        *[markdown_table(header, rows) for header, rows in results if rows],
+        "## Notes\n\n" + "\n".join(f"- {note}" for note in verdict.notes) if verdict.notes else "",
+        section("Counts", keyed_rows(run, COUNTS), "count"),
+        section("Balances", keyed_rows(run, BALANCES), "largest relative difference or drift"),
+        section("Costs", cost_rows(run), "phase"),
     ] if part)
     (run.path / "summary.md").write_text(text + "\n")
+
+
+def section(title, rows, header):
+    return f"## {title}\n\n" + markdown_table([header, ""], rows) if rows else ""
 
 
 def what_was_run(run):
@@ -62,26 +67,27 @@ def what_was_run(run):
         scene.append(", ".join(str(bridge[k]) for k in ("scheme", "acceleration", "iterate")
                                if k in bridge))
     lines.append("- " + "; ".join(scene))
-    lines.append(f"- started {s.get('started')} on {s.get('processor')}, "
-                 f"{s.get('threads')} threads")
+    threads = f", {s['threads']} threads" if "threads" in s else ""
+    lines.append(f"- started {s.get('started')} on {s.get('processor')}{threads}")
     return "\n".join(lines)
 
 
-def keyed_table(run, header, keys):
-    return markdown_table([header, ""], [[text, number(run.summary.get(key))]
-                                         for key, text in keys])
+def keyed_rows(run, keys):
+    """Rows of what the run reports."""
+    return [[text, number(run.summary[key])] for key, text in keys
+            if run.summary.get(key) is not None]
 
 
-def costs(run):
+def cost_rows(run):
     s = run.summary
-    rows = [["whole run, wall time", f"{s['wall_time_s']:.1f} s"],
-            ["whole run, CPU time", f"{s['cpu_time_s']:.1f} s"]]
-    rows += [[f"{part}, per step", with_unit(s.get(f"ms_per_step_{part}"))]
-             for part in ("fluid", "solid", "bridge")]
+    rows = [[f"whole run, {name} time", f"{s[key]:.1f} s"]
+            for name, key in (("wall", "wall_time_s"), ("CPU", "cpu_time_s")) if key in s]
+    rows += [[f"{part}, per step", with_unit(s[f"ms_per_step_{part}"])]
+             for part in ("fluid", "solid", "bridge") if s.get(f"ms_per_step_{part}") is not None]
     for part, phases in (s.get("phases_ms") or {}).items():
         rows += [[f"{part}: {phase}", with_unit(ms)] for phase, ms in phases.items()]
-    return markdown_table(["phase", "time"], rows)
+    return rows
 
 
 def with_unit(milliseconds):
-    return None if milliseconds is None else f"{milliseconds:.3g} ms"
+    return f"{milliseconds:.3g} ms"

@@ -11,7 +11,7 @@ from vtkmodules.vtkIOXML import vtkXMLPolyDataReader, vtkXMLUnstructuredGridRead
 
 @dataclass(frozen=True)
 class Cloud:
-    position: np.ndarray  # (n, 2) [m]
+    position: np.ndarray  # (n, 2) or (n, 3) [m]
     fields: dict          # name -> (n, ...) array
 
 
@@ -21,17 +21,18 @@ class Outline:
     edges: list     # of (2, 2) arrays [m]: sides that belong to one face only
 
 
-def read_cloud(path):
+def read_cloud(path, dimension=2):
+    """Points of a run; `dimension` 3 keeps their z."""
     reader = vtkXMLPolyDataReader()
     reader.SetFileName(str(path))
     reader.Update()
     data = reader.GetOutput()
     if data.GetNumberOfPoints() == 0:
-        return Cloud(np.empty((0, 2)), {})
+        return Cloud(np.empty((0, dimension)), {})
     arrays = data.GetPointData()
     fields = {arrays.GetArrayName(k): vtk_to_numpy(arrays.GetArray(k))
               for k in range(arrays.GetNumberOfArrays())}
-    return Cloud(vtk_to_numpy(data.GetPoints().GetData())[:, :2], fields)
+    return Cloud(vtk_to_numpy(data.GetPoints().GetData())[:, :dimension], fields)
 
 
 def read_outline(path):

@@ -49,6 +49,7 @@ template <int dim> struct FluidParams {
   double outlet_x = 1e300;
   bool open_sides = false;
   bool free_surface = true;
+  bool holds_tension = false;
   std::string coupled_walls = "move";
   std::string start_state;
   std::vector<std::string> fields{"pressure", "velocity", "viscosity", "kind", "id", "volume"};
@@ -105,6 +106,8 @@ template <int dim> struct FluidParams {
     read("free_surface", free_surface, "false: the fluid fills a closed container and has no air")
         .check(free_surface || outlet_x > 1e299,
                "has no outlet: outlet_x_m is for water next to air");
+    read("holds_tension", holds_tension,
+         "points next to air may pull: for a drop or a patch held together by nothing else");
     read("coupled_walls", coupled_walls, "what coupled walls do").one_of({"move", "stay"});
     read("start_state", start_state,
          "file fluid_state.h5 of a run to go on from, instead of filling water_m");

@@ -212,7 +212,7 @@ template <int dim> void FluidSolver<dim>::assemble() {
     volume_restoring_divergence(points, cloud_, params_.motion, pace_.volume, target_divergence_);
     assemble_pressure_source(points, cloud_, pressure_params_, predicted_, target_divergence_,
                              projection_dt_, problem_);
-    if (state.step > 0) // the first step has no pressure to judge by
+    if (state.step > 0 && !params_.holds_tension) // the first step has no pressure to judge by
       report_.released = release_tension(points, walls, pressure_params_, predicted_,
                                          target_divergence_, projection_dt_, cloud_, problem_);
   });

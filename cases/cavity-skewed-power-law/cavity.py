@@ -2,6 +2,7 @@
 """The cavity: its geometry from three numbers, its references, and what is measured on a run."""
 
 import csv
+import dataclasses
 import math
 import re
 from dataclasses import dataclass
@@ -27,6 +28,27 @@ class Cavity:
     exponent: float = 1.5
     points_per_side: int = 100
     courant: float = 0.2
+
+    def __post_init__(self):
+        if not 10 <= self.angle_deg <= 170:
+            raise ValueError(f"parameters.angle_deg = {self.angle_deg:g} is not in 10 ... 170")
+        if min(self.reynolds, self.exponent, self.points_per_side, self.courant) <= 0:
+            raise ValueError("reynolds, exponent, points_per_side and courant are above zero")
+
+    def with_spacing(self, spacing):
+        return dataclasses.replace(self, points_per_side=round(math.sqrt(self.sine) / spacing))
+
+    def keys(self):
+        """What follows for the case file."""
+        c = self.corners
+        return {
+            "case": {"time_step_s": self.courant / self.points_per_side},
+            "fluid": {"spacing_m": self.spacing, "water_m": c},
+            "fluid.rheology": {"consistency_pa_s_n": 1 / self.reynolds, "exponent": self.exponent},
+            "fluid.wall.sides": {"points_m": [c[3], c[0], c[1], c[2]]},
+            "fluid.wall.lid": {"points_m": [c[2], c[3]]},
+            "fluid.probe.ab": {"from_m": self.place(0.5, 0), "to_m": self.place(0.5, 1)},
+            "fluid.probe.cd": {"from_m": self.place(0, 0.5), "to_m": self.place(1, 0.5)}}
 
     @property
     def sine(self):

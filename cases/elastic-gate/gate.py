@@ -8,6 +8,7 @@ import numpy as np
 
 from compare import Curve, rms_difference
 from run_folder import RunError, read_columns
+from verdict import Check, count_of
 
 REFERENCE = Path(__file__).resolve().parent / "reference"
 DIGITISING_M = 1e-3          # uncertainty of a digitised point, beside the spread of the two
@@ -67,14 +68,6 @@ class Measures:
     instants_compared: int
 
 
-@dataclass(frozen=True)
-class Check:
-    what: str
-    value: str
-    band: str
-    holds: bool
-
-
 def read_experiment():
     data = read_columns(REFERENCE / "antoci_gate_tip_experiment_mean.csv")
     time = data["time_s"]
@@ -130,19 +123,14 @@ def is_complete(run, tip):
 
 def checks(run, tip, measures):
     """What the case demands of this run; a run that ends early is judged on what it contains."""
-    found = [count_check(run, "lost_points", "lost points"),
-             count_check(run, "failed_windows", "failed windows")]
+    found = [count_of(run, "lost_points", "lost points"),
+             count_of(run, "failed_windows", "failed windows")]
     if tip.ux.end >= PEAK_JUDGED_FROM_S - 1e-9:
         found.append(band_check("peak of x", measures.peak_ux_m, PEAK_BAND_M))
     if tip.ux.end >= MINIMUM_JUDGED_FROM_S - 0.5 * window_length(run) - 1e-9:
         found.append(band_check("minimum of x after the peak", measures.min_ux_after_peak_m,
                                 MINIMUM_BAND_M))
     return found
-
-
-def count_check(run, key, what):
-    value = run.summary.get(key)
-    return Check(what, "not reported" if value is None else str(value), "0", value == 0)
 
 
 def band_check(what, value, band):

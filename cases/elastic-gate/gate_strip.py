@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The strip of pictures: water coloured by pressure and the deformed gate, every 0.04 s."""
+"""The strip of pictures: water coloured by pressure, or another field, and the deformed gate, every 0.04 s."""
+
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.cm import ScalarMappable
@@ -12,9 +14,18 @@ from vtk_files import read_cloud, read_outline
 INTERVAL_S = 0.04
 VIEW_MM = ((-4.0, 330.0), (-5.0, 158.0))
 COLUMNS, PICTURE_IN = 3, 3.2
-COLOURS = "viridis"
 WALL = "#4D4D4D"
 GATE_FACE, GATE_EDGE = "#D9D9D9", "#000000"
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """Which field of the points is shown, and how."""
+
+    field: str
+    label: str
+    norm: Normalize
+    colours: str = "viridis"
 
 
 def frames(run):
@@ -38,8 +49,10 @@ def solid_at(solids, time):
     return min(near)[1] if near else None
 
 
-def draw(run):
+def draw(run, name="strip.png", colouring=None):
     case = run.case()
+    colouring = colouring or Colouring("pressure", "pressure [Pa]",
+                                       Normalize(0, hydrostatic_pressure(case)))
     shown = frames(run)
     columns = min(COLUMNS, len(shown) + 1)   # one cell for the colour bar
     rows = -(-(len(shown) + 1) // columns)
@@ -47,14 +60,13 @@ def draw(run):
     figure, axes = new_figure(columns * PICTURE_IN, rows * PICTURE_IN * aspect * 1.03,
                               rows, columns, gridspec_kw={"wspace": 0.04, "hspace": 0.03})
     axes = axes.ravel()
-    colour = Normalize(0, hydrostatic_pressure(case))
     for k, (ax, (time, cloud, solid)) in enumerate(zip(axes, shown)):
-        draw_frame(ax, case, time, cloud, solid, colour)
+        draw_frame(ax, case, time, cloud, solid, colouring)
         label_axes(ax, left=k % columns == 0, below=k + columns >= len(shown))
     for ax in axes[len(shown):]:
         ax.set_axis_off()
-    draw_colour_bar(figure, axes[len(shown)], colour)
-    return save(figure, run.path / "strip.png")
+    draw_colour_bar(figure, axes[len(shown)], colouring)
+    return save(figure, run.path / name)
 
 
 def hydrostatic_pressure(case):
@@ -64,14 +76,15 @@ def hydrostatic_pressure(case):
     return fluid["density_kg_m3"] * np.linalg.norm(fluid["gravity_m_s2"]) * depth
 
 
-def draw_frame(ax, case, time, cloud_file, solid_file, colour):
+def draw_frame(ax, case, time, cloud_file, solid_file, colouring):
     draw_walls(ax, case)
     cloud = read_cloud(cloud_file)
     size = 1e3 * case["fluid"]["spacing_m"]
+    nothing_yet = np.full(len(cloud.position), colouring.norm.vmin)   # before the first step
     ax.add_collection(EllipseCollection(
         [size], [size], [0], units="xy", offsets=1e3 * cloud.position,
-        transOffset=ax.transData, array=cloud.fields["pressure"].ravel(), cmap=COLOURS,
-        norm=colour, linewidths=0, zorder=2))
+        transOffset=ax.transData, array=np.ravel(cloud.fields.get(colouring.field, nothing_yet)),
+        cmap=colouring.colours, norm=colouring.norm, linewidths=0, zorder=2))
     if solid_file is not None:
         draw_gate(ax, read_outline(solid_file))
     ax.set(xlim=VIEW_MM[0], ylim=VIEW_MM[1], aspect="equal")
@@ -111,7 +124,7 @@ def label_axes(ax, left, below):
         ax.set_xlabel("x [mm]")
 
 
-def draw_colour_bar(figure, ax, colour):
+def draw_colour_bar(figure, ax, colouring):
     bar = ax.inset_axes([0.08, 0.5, 0.84, 0.09])
-    figure.colorbar(ScalarMappable(colour, COLOURS), cax=bar, orientation="horizontal",
-                    extend="both", label="pressure [Pa]")
+    figure.colorbar(ScalarMappable(colouring.norm, colouring.colours), cax=bar,
+                    orientation="horizontal", extend="both", label=colouring.label)

@@ -8,20 +8,13 @@ import numpy as np
 
 from compare import Curve
 from run_folder import RunError, read_columns
+from verdict import Check
 
 REFERENCE = Path(__file__).resolve().parent / "reference"
 STATIC_BANDS = {"csm1": 0.002, "csm2": 0.003}  # relative, both components
 FREQUENCY_BAND, UY_AMPLITUDE_BAND, UX_BAND = 0.005, 0.005, 0.025
 CSM3_LEVEL, CSM3_STEP_S = "4+0", 0.005
 STATIC_LEVEL = "5+1"
-
-
-@dataclass(frozen=True)
-class Check:
-    what: str
-    value: str
-    band: str
-    holds: bool
 
 
 @dataclass(frozen=True)

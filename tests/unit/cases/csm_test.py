@@ -17,6 +17,7 @@ sys.path.insert(0, str(paths.CASES / "turek-hron-csm"))
 
 import csm  # noqa: E402
 import numpy as np  # noqa: E402
+import verdict  # noqa: E402
 from compare import Curve  # noqa: E402
 
 
@@ -71,7 +72,7 @@ class ValidateTest(unittest.TestCase):
                        for t, x, y in zip(ux.time, ux.value, uy.value))
         (folder / "csm3" / "probes.csv").write_text("time_s,A_ux_m,A_uy_m\n" + rows)
         with contextlib.redirect_stdout(io.StringIO()):
-            return command("validate").validate(folder), folder
+            return verdict.validate(folder, command("validate").judge), folder
 
     def test_the_reference_passes_and_a_percent_more_does_not(self):
         status, folder = self.run_with(1.0)
