@@ -79,7 +79,8 @@ public:
   bool requires_reading_checkpoint() const;
 
   /// Own field at the end of this step. Throws UserError for a wrong size, a field that this side
-  /// does not write, or a value that is not finite (naming node and value).
+  /// does not write, or a value that is not finite (naming node and value; where
+  /// windows are halved the window fails, and the field is zero until it is written again).
   void write_data(std::string_view field, std::span<const double> values);
   /// The partner's field at `relative_time` [s] after the current time: in a window of length dt
   /// 0 gives the value at its start, dt the current iterate at its end, linear in between, or on
