@@ -174,6 +174,10 @@ std::string token_of(const BridgeSettings &settings) {
 
 std::unique_ptr<Link> connect_to_partner(Role role, const BridgeSettings &settings,
                                          const std::filesystem::path &out_dir) {
+  check(settings.transport != "mpi",
+        "bridge.transport = mpi is for two programs in one mpirun that split its ranks "
+        "(bridge/transport_mpi.hpp); the {} did not: use unix, shared or tcp",
+        name_of(role));
   const Address address = address_of(settings, out_dir);
   if (role == Role::fluid)
     return listen_for_partner(settings, address);

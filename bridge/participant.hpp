@@ -50,7 +50,8 @@ public:
   /// `name` is "fluid" or "solid". Reads [bridge] and [case] of the case file; connects nothing
   /// yet. The solid writes `out_dir`/coupling.csv (and balance.csv when totals are reported).
   Participant(std::string name, const Config &config, const std::filesystem::path &out_dir);
-  /// For tests: speaks over `transport`, already connected, instead of a socket.
+  /// Speaks over `transport`, already connected, instead of a socket: between two threads
+  /// (transport_local.hpp) or in one mpirun (transport_mpi.hpp). Nothing: as above.
   Participant(std::string name, const Config &config, const std::filesystem::path &out_dir,
               std::unique_ptr<Transport> transport);
   /// Without finalize (a throw passes through) the partner is sent an abort, best effort.
