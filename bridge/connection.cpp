@@ -110,11 +110,13 @@ std::unique_ptr<Link> listen_for_partner(const BridgeSettings &settings, const A
 
 std::unique_ptr<Transport> retry_connecting(const BridgeSettings &settings,
                                             const Address &address) {
+  using std::chrono::milliseconds;
   const Deadline deadline = deadline_in(settings.connect_deadline);
-  while (Clock::now() < deadline) {
+  for (milliseconds pause(1); Clock::now() < deadline;
+       pause = std::min(2 * pause, milliseconds(16))) {
     if (auto transport = try_connect(address, deadline))
       return transport;
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    std::this_thread::sleep_for(pause);
   }
   fail("bridge: the solid waited {} s for the fluid at {}, where nobody listened "
        "(bridge.connect_deadline_s)",
@@ -172,6 +174,10 @@ std::string token_of(const BridgeSettings &settings) {
 
 std::unique_ptr<Link> connect_to_partner(Role role, const BridgeSettings &settings,
                                          const std::filesystem::path &out_dir) {
+  check(settings.transport != "mpi",
+        "bridge.transport = mpi is for two programs in one mpirun that split its ranks "
+        "(bridge/transport_mpi.hpp); the {} did not: use unix, shared or tcp",
+        name_of(role));
   const Address address = address_of(settings, out_dir);
   if (role == Role::fluid)
     return listen_for_partner(settings, address);

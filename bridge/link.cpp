@@ -12,9 +12,7 @@ namespace sluice::bridge {
 namespace {
 
 constexpr std::size_t longest_last_message = 1 << 16; // [bytes]
-constexpr std::size_t chunk = 1 << 20;                // [bytes] memory grows by what has arrived
-constexpr std::size_t largest_frame = 1 << 30;        // [bytes]
-constexpr std::size_t inbox_size = 1 << 14;           // [bytes]
+constexpr std::size_t inbox_size = 1 << 12;           // [bytes]
 
 // No byte for the whole silence deadline.
 class Silence : public std::runtime_error {
@@ -22,7 +20,19 @@ public:
   Silence() : std::runtime_error("silence") {}
 };
 
+void check_length(const FrameHeader &header, std::size_t limit) {
+  if (header.length > limit)
+    throw MalformedMessage(fmt::format("a {} frame announces {} bytes, at most {} are allowed",
+                                       name_of(header.type), header.length, limit));
+}
+
 } // namespace
+
+std::string Awaited::text() const {
+  if (window == 0)
+    return std::string(what);
+  return fmt::format("{} iteration {} of window {} (t = {:.6g} s)", what, iteration, window, start);
+}
 
 Link::Link(std::unique_ptr<Transport> transport, std::string self, std::string partner,
            double silence_deadline)
@@ -60,27 +70,30 @@ void Link::beat(std::stop_token stop) {
 }
 
 void Link::send_frame(FrameType type, PayloadWriter &payload, double patience) {
-  std::span<const std::byte> rest = payload.frame(type, sent_);
-  while (!rest.empty()) {
-    const std::size_t n = transport_->write_some(rest, wait_until(patience));
+  auto frame = payload.frame(type, sent_);
+  for (std::span rest(frame); !rest.empty();) {
+    std::size_t n = transport_->write_some(rest, wait_until(patience));
     if (n == 0)
       throw Silence();
-    rest = rest.subspan(n);
     bytes_sent_ += n;
+    for (; !rest.empty() && n >= rest.front().size(); rest = rest.subspan(1))
+      n -= rest.front().size();
+    if (n > 0)
+      rest.front() = rest.front().subspan(n);
   }
   ++sent_;
 }
 
 void Link::send(FrameType type, PayloadWriter &&payload) {
-  const std::string activity = fmt::format("sent its {} frame", name_of(type));
+  const auto activity = [&] { return fmt::format("sent its {} frame", name_of(type)); };
   try {
     const std::lock_guard lock(sending_);
     send_frame(type, payload, silence_deadline_);
   } catch (const ConnectionLost &lost) {
-    report_loss(activity, lost.what());
+    report_loss(activity(), lost.what());
   } catch (const Silence &) {
     fail("bridge: the {} took in nothing for {} s while the {} {}; it is stopped or unreachable",
-         partner_, silence_deadline_, self_, activity);
+         partner_, silence_deadline_, self_, activity());
   }
 }
 
@@ -94,44 +107,47 @@ void Link::send_abort(std::string_view message) noexcept {
   }
 }
 
-Bytes Link::receive_bytes(FrameType expected, std::size_t limit, std::string_view awaited) {
+void Link::receive_frame(FrameType expected, std::size_t limit, const Awaited &awaited,
+                         const Decoder &decode) {
   const Stopwatch watch;
-  const std::string activity = fmt::format("awaited {}", awaited);
   try {
-    Bytes payload = next_frame(expected, limit, activity);
+    const FrameHeader header = next_header(expected, limit, awaited);
     wait_s_ += watch.seconds();
-    return payload;
+    PayloadReader reader(*this, header.length);
+    decode(reader);
+    reader.finish();
   } catch (const ConnectionLost &lost) {
-    report_loss(activity, lost.what());
+    report_loss("awaited " + awaited.text(), lost.what());
   } catch (const Silence &) {
-    check(!greeting_deadline_, "bridge: no complete greeting came in time while the {} {}", self_,
-          activity);
-    fail("bridge: the {} was silent for {} s (not even a heartbeat) while the {} {}; it is stopped "
-         "or unreachable (bridge.silence_deadline_s)",
-         partner_, silence_deadline_, self_, activity);
+    check(!greeting_deadline_, "bridge: no complete greeting came in time while the {} awaited {}",
+          self_, awaited.text());
+    fail("bridge: the {} was silent for {} s (not even a heartbeat) while the {} awaited {}; it is "
+         "stopped or unreachable (bridge.silence_deadline_s)",
+         partner_, silence_deadline_, self_, awaited.text());
   } catch (const MalformedMessage &error) {
-    report_malformed(awaited, error);
+    report_malformed(awaited.text(), error);
   }
 }
 
-Bytes Link::next_frame(FrameType expected, std::size_t limit, std::string_view activity) {
+// Past heartbeats to the header of a frame that may be read.
+FrameHeader Link::next_header(FrameType expected, std::size_t limit, const Awaited &awaited) {
   while (true) {
     const FrameHeader header = read_header();
-    const bool is_last = header.type == FrameType::abort;
-    Bytes payload = read_payload(header, is_last ? longest_last_message : limit);
-    if (is_last)
-      report_abort(payload, activity);
-    if (header.type == expected)
-      return payload;
-    if (header.type != FrameType::heartbeat || greeting_deadline_)
+    if (header.type == FrameType::abort)
+      report_abort(header, "awaited " + awaited.text());
+    const bool is_expected = header.type == expected;
+    if (!is_expected && (header.type != FrameType::heartbeat || greeting_deadline_))
       throw MalformedMessage(
           fmt::format("a {} frame came instead of {}", name_of(header.type), name_of(expected)));
+    check_length(header, is_expected ? limit : 0);
+    if (is_expected)
+      return header;
   }
 }
 
 FrameHeader Link::read_header() {
   std::array<std::byte, header_size> bytes;
-  read_all(bytes);
+  read(bytes);
   const FrameHeader header = decode_header(bytes);
   if (header.sequence != received_)
     throw MalformedMessage(
@@ -140,31 +156,21 @@ FrameHeader Link::read_header() {
   return header;
 }
 
-Bytes Link::read_payload(const FrameHeader &header, std::size_t limit) {
-  if (header.length > limit)
-    throw MalformedMessage(fmt::format("a {} frame announces {} bytes, at most {} are allowed",
-                                       name_of(header.type), header.length, limit));
-  Bytes payload;
-  while (payload.size() < header.length) {
-    const std::size_t have = payload.size();
-    payload.resize(std::min<std::size_t>(header.length, have + chunk));
-    read_all(std::span(payload).subspan(have));
-  }
-  check_payload(header, payload);
-  return payload;
-}
-
-void Link::read_all(std::span<std::byte> bytes) {
-  while (!bytes.empty()) {
-    if (inbox_read_ == inbox_end_ && bytes.size() < inbox_size) {
-      inbox_end_ = read_some(inbox_);
-      inbox_read_ = 0;
+// A long run of bytes goes past the inbox to where it belongs.
+void Link::read(std::span<std::byte> into) {
+  while (!into.empty()) {
+    if (inbox_read_ == inbox_end_ && into.size() >= inbox_size) {
+      into = into.subspan(read_some(into));
+      continue;
     }
-    const std::size_t waiting = std::min(inbox_end_ - inbox_read_, bytes.size());
-    if (waiting > 0)
-      std::memcpy(bytes.data(), inbox_.data() + inbox_read_, waiting);
-    inbox_read_ += waiting;
-    bytes = bytes.subspan(waiting > 0 ? waiting : read_some(bytes));
+    if (inbox_read_ == inbox_end_) {
+      inbox_read_ = inbox_end_ = 0;
+      inbox_end_ = read_some(inbox_);
+    }
+    const std::size_t n = std::min(inbox_end_ - inbox_read_, into.size());
+    std::memcpy(into.data(), inbox_.data() + inbox_read_, n);
+    inbox_read_ += n;
+    into = into.subspan(n);
   }
 }
 
@@ -181,10 +187,11 @@ Deadline Link::wait_until(double patience) const {
   return greeting_deadline_ ? std::min(deadline, *greeting_deadline_) : deadline;
 }
 
-void Link::report_abort(std::span<const std::byte> payload, std::string_view activity) const {
-  PayloadReader reader(payload);
+void Link::report_abort(const FrameHeader &header, std::string_view activity) {
+  check_length(header, longest_last_message);
+  PayloadReader read(*this, header.length);
   fail("bridge: the {} gave up while the {} {}; its last message: {}", partner_, self_, activity,
-       reader.text());
+       read.text());
 }
 
 void Link::report_malformed(std::string_view awaited, const MalformedMessage &error) const {
@@ -192,14 +199,20 @@ void Link::report_malformed(std::string_view awaited, const MalformedMessage &er
        error.what());
 }
 
-// The stream is broken; what the partner said before it went may still lie in the buffer.
+// The stream is broken; what the partner said before it went may still lie in the buffer, behind
+// frames that nobody awaits any more.
 void Link::report_loss(std::string_view activity, std::string_view reason) {
   try {
     while (true) {
       const FrameHeader header = read_header();
-      const Bytes payload = read_payload(header, largest_frame);
       if (header.type == FrameType::abort)
-        report_abort(payload, activity);
+        report_abort(header, activity);
+      for (std::uint64_t left = header.length; left > 0;) {
+        std::array<std::byte, inbox_size> unread;
+        const auto n = std::min<std::uint64_t>(left, unread.size());
+        read(std::span(unread).first(n));
+        left -= n;
+      }
     }
   } catch (const UserError &) {
     throw;

@@ -8,16 +8,34 @@
 
 #include <atomic>
 #include <condition_variable>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <thread>
+#include <type_traits>
 
 namespace sluice::bridge {
 
-class Link {
+/// What a wait is for, put into words only when it fails: "the fluid's greeting", or "the forces of
+/// iteration 2 of window 7 (t = 0.0012 s)".
+struct Awaited {
+  Awaited(std::string_view thing) : what(thing) {}
+  Awaited(const std::string &thing) : what(thing) {}
+  Awaited(const char *thing) : what(thing) {}
+  Awaited(std::string_view thing, int of_iteration, long of_window, double at)
+      : what(thing), iteration(of_iteration), window(of_window), start(at) {}
+  std::string text() const;
+
+  std::string_view what;
+  int iteration = 0;
+  long window = 0;  // 0: before the first
+  double start = 0; // [s] of the window
+};
+
+class Link : private ByteSource {
 public:
   /// `self` and `partner` are the roles ("fluid", "solid"); `silence_deadline` [s] bounds the time
   /// without a single byte from the partner.
@@ -40,40 +58,35 @@ public:
   /// Sends one frame. Throws UserError when the partner is gone or takes nothing in.
   void send(FrameType type, PayloadWriter &&payload);
   /// Waits for a frame of type `expected` with at most `limit` bytes of payload and returns
-  /// `decode(PayloadReader &)`; `awaited` completes "while the fluid awaited ...". Throws UserError
-  /// for an abort, silence, the end of the stream or bytes that the protocol does not allow.
+  /// `decode(PayloadReader &)`, which reads while the bytes arrive; `awaited` completes "while the
+  /// fluid awaited ...". Throws UserError for an abort, silence, the end of the stream or bytes
+  /// that the protocol does not allow; what `decode` has filled by then is worth nothing.
   template <class Decode>
-  auto receive(FrameType expected, std::size_t limit, std::string_view awaited, Decode &&decode) {
-    const Bytes payload = receive_bytes(expected, limit, awaited);
-    try {
-      PayloadReader reader(payload);
-      auto value = decode(reader);
-      reader.finish();
-      return value;
-    } catch (const MalformedMessage &error) {
-      report_malformed(awaited, error);
-    }
+  auto receive(FrameType expected, std::size_t limit, const Awaited &awaited, Decode &&decode) {
+    std::optional<std::invoke_result_t<Decode, PayloadReader &>> value;
+    receive_frame(expected, limit, awaited, [&](PayloadReader &read) { value = decode(read); });
+    return *std::move(value);
   }
   /// Tells the partner why this side ends; best effort, at most a fraction of a second.
   void send_abort(std::string_view message) noexcept;
 
   const std::string &partner() const { return partner_; }
-  double wait_s() const { return wait_s_; } ///< [s] spent in receive
+  double wait_s() const { return wait_s_; } ///< [s] until the frames came that were awaited
   std::uint64_t bytes_sent() const { return bytes_sent_; }
   std::uint64_t bytes_received() const { return bytes_received_; }
 
 private:
   void beat(std::stop_token stop);
+  using Decoder = std::function<void(PayloadReader &)>;
   void send_frame(FrameType type, PayloadWriter &payload, double patience);
-  Bytes receive_bytes(FrameType expected, std::size_t limit, std::string_view awaited);
-  Bytes next_frame(FrameType expected, std::size_t limit, std::string_view activity);
+  void receive_frame(FrameType expected, std::size_t limit, const Awaited &awaited,
+                     const Decoder &decode);
+  FrameHeader next_header(FrameType expected, std::size_t limit, const Awaited &awaited);
   FrameHeader read_header();
-  Bytes read_payload(const FrameHeader &header, std::size_t limit);
-  void read_all(std::span<std::byte> bytes);
+  void read(std::span<std::byte> into) override;
   std::size_t read_some(std::span<std::byte> bytes);
   Deadline wait_until(double patience) const;
-  [[noreturn]] void report_abort(std::span<const std::byte> payload,
-                                 std::string_view activity) const;
+  [[noreturn]] void report_abort(const FrameHeader &header, std::string_view activity);
   [[noreturn]] void report_malformed(std::string_view awaited, const MalformedMessage &error) const;
   [[noreturn]] void report_loss(std::string_view activity, std::string_view reason);
 

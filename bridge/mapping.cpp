@@ -23,18 +23,28 @@ Eigen::Map<const NodeValues> by_node(std::span<const double> values, int dim) {
 }
 
 // `factor` times the matrix times each component that both sides have; the others are zero.
-std::vector<double> product(double factor, const Mapping::Matrix &matrix,
-                            std::span<const double> values, int dim_in, int dim_out) {
+void multiply(double factor, const Mapping::Matrix &matrix, std::span<const double> values,
+              int dim_in, int dim_out, std::span<double> result) {
   assert(static_cast<Eigen::Index>(values.size()) == matrix.cols() * dim_in);
-  std::vector<double> result(static_cast<std::size_t>(matrix.rows() * dim_out));
+  assert(static_cast<Eigen::Index>(result.size()) == matrix.rows() * dim_out);
   Eigen::Map<NodeValues> out(result.data(), matrix.rows(), dim_out);
-  if (dim_in == dim_out)
+  if (dim_in == dim_out) {
     out.noalias() = matrix * by_node(values, dim_in);
-  else
+  } else {
+    out.setZero();
     out.leftCols(2) = matrix * by_node(values, dim_in).leftCols(2);
+  }
   if (factor != 1)
     out *= factor;
-  return result;
+}
+
+bool is_unit_matrix(const Mapping::Matrix &matrix) {
+  if (matrix.rows() != matrix.cols() || matrix.nonZeros() != matrix.rows())
+    return false;
+  for (int row = 0; row < matrix.rows(); ++row)
+    if (matrix.coeff(row, row) != 1)
+      return false;
+  return true;
 }
 
 } // namespace
@@ -43,7 +53,8 @@ Mapping::Mapping(const InterfaceMesh &fluid, const InterfaceMesh &solid, Matrix 
                  MapReport report, double depth)
     : fluid_dim_(fluid.dim), solid_dim_(solid.dim), depth_(depth), matrix_(std::move(matrix)),
       transpose_(matrix_.transpose()), fluid_areas_(node_areas(fluid)),
-      solid_areas_(node_areas(solid)), report_(report) {
+      solid_areas_(node_areas(solid)), report_(report),
+      is_identity_(fluid.dim == solid.dim && depth == 1 && is_unit_matrix(matrix_)) {
   const Eigen::VectorXd row_sums = matrix_ * Eigen::VectorXd::Ones(matrix_.cols());
   report_.fluid_nodes = fluid.n_nodes();
   report_.solid_nodes = solid.n_nodes();
@@ -55,11 +66,25 @@ Mapping::Mapping(const InterfaceMesh &fluid, const InterfaceMesh &solid, Matrix 
 }
 
 std::vector<double> Mapping::consistent(std::span<const double> solid_values) const {
-  return product(1, matrix_, solid_values, solid_dim_, fluid_dim_);
+  std::vector<double> result(static_cast<std::size_t>(matrix_.rows() * fluid_dim_));
+  consistent(solid_values, result);
+  return result;
+}
+
+void Mapping::consistent(std::span<const double> solid_values,
+                         std::span<double> fluid_values) const {
+  multiply(1, matrix_, solid_values, solid_dim_, fluid_dim_, fluid_values);
 }
 
 std::vector<double> Mapping::conservative(std::span<const double> fluid_values) const {
-  return product(depth_, transpose_, fluid_values, fluid_dim_, solid_dim_);
+  std::vector<double> result(static_cast<std::size_t>(transpose_.rows() * solid_dim_));
+  conservative(fluid_values, result);
+  return result;
+}
+
+void Mapping::conservative(std::span<const double> fluid_values,
+                           std::span<double> solid_values) const {
+  multiply(depth_, transpose_, fluid_values, fluid_dim_, solid_dim_, solid_values);
 }
 
 std::vector<double> Mapping::traction(std::span<const double> fluid_values) const {

@@ -40,9 +40,14 @@ public:
   /// F_s = H^T F_f; forces per metre of a plane fluid times depth() on a solid in space. Sizes: the
   /// fluid's dim per fluid node in, the solid's dim per solid node out.
   std::vector<double> conservative(std::span<const double> fluid_values) const;
+  /// The same into memory that is there already.
+  void consistent(std::span<const double> solid_values, std::span<double> fluid_values) const;
+  void conservative(std::span<const double> fluid_values, std::span<double> solid_values) const;
   /// Tractions [Pa] at the fluid's nodes to tractions at the solid's with the same resultant.
   std::vector<double> traction(std::span<const double> fluid_values) const;
 
+  /// True where each node meets the same node of the other side, so that values pass as they are.
+  bool is_identity() const { return is_identity_; }
   /// [m] of the solid along z where only the fluid is plane; else 1.
   double depth() const { return depth_; }
   const Matrix &matrix() const { return matrix_; }
@@ -55,6 +60,7 @@ private:
   Matrix transpose_;                              // kept: its rows are read in order
   std::vector<double> fluid_areas_, solid_areas_; // of the nodes
   MapReport report_;
+  bool is_identity_ = false;
 };
 
 enum class MapKind { nearest, projection, mortar, rbf };

@@ -3,7 +3,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
+#include <cassert>
 #include <cstring>
 
 namespace sluice::bridge {
@@ -41,42 +43,34 @@ std::string name_of(FrameType type) {
 
 std::uint64_t checksum(std::span<const std::byte> bytes) {
   constexpr std::uint64_t odd = 0x9E3779B97F4A7C15u; // 2^64 / golden ratio
-  const auto mix = [](std::uint64_t &state, std::uint64_t word) {
+  std::uint64_t state = bytes.size() * odd + 1;
+  for (std::size_t k = 0; k < bytes.size(); k += 8) {
+    std::uint64_t word = 0;
+    std::memcpy(&word, bytes.data() + k, std::min<std::size_t>(8, bytes.size() - k));
     state = (state ^ word) * odd;
     state ^= state >> 32;
-  };
-  std::array<std::uint64_t, 4> chains{1, 2, 3, 4};
-  std::size_t k = 0;
-  for (; k + 32 <= bytes.size(); k += 32)
-    for (std::size_t c = 0; c < 4; ++c)
-      mix(chains[c], get<std::uint64_t>(bytes, k + 8 * c));
-  std::array<std::uint64_t, 4> last{};
-  if (k < bytes.size())
-    std::memcpy(last.data(), bytes.data() + k, bytes.size() - k);
-  std::uint64_t state = bytes.size() * odd + 1;
-  for (std::size_t c = 0; c < 4; ++c) {
-    mix(chains[c], last[c]);
-    mix(state, chains[c]);
   }
   return state;
 }
 
-void write_header(FrameType type, std::uint64_t sequence, std::span<std::byte> frame) {
-  const std::span<const std::byte> payload = frame.subspan(header_size);
-  put(frame, 0, magic);
-  put(frame, 4, protocol_version);
-  put(frame, 6, static_cast<std::uint16_t>(type));
-  put(frame, 8, sequence);
-  put(frame, 16, static_cast<std::uint64_t>(payload.size()));
-  put(frame, 24, checksum(payload));
-  put(frame, 32, checksum(frame.first(checked_header_size)));
+namespace {
+
+void write_header(FrameType type, std::uint64_t sequence, std::uint64_t length,
+                  std::span<std::byte> header) {
+  put(header, 0, magic);
+  put(header, 4, protocol_version);
+  put(header, 6, static_cast<std::uint16_t>(type));
+  put(header, 8, sequence);
+  put(header, 16, length);
+  put(header, 24, checksum(header.first(checked_header_size)));
 }
 
+} // namespace
+
 Bytes encode_frame(FrameType type, std::uint64_t sequence, std::span<const std::byte> payload) {
-  Bytes frame(header_size + payload.size());
-  if (!payload.empty())
-    std::memcpy(frame.data() + header_size, payload.data(), payload.size());
-  write_header(type, sequence, frame);
+  Bytes frame(header_size);
+  write_header(type, sequence, payload.size(), frame);
+  frame.insert(frame.end(), payload.begin(), payload.end());
   return frame;
 }
 
@@ -84,28 +78,22 @@ FrameHeader decode_header(std::span<const std::byte, header_size> bytes) {
   if (get<std::array<char, 4>>(bytes, 0) != magic)
     throw MalformedMessage(
         "the bytes do not start a Sluice frame (another program at this address?)");
-  if (get<std::uint64_t>(bytes, 32) != checksum(bytes.first(checked_header_size)))
-    throw MalformedMessage("a frame's header is damaged (checksum)");
   if (const auto version = get<std::uint16_t>(bytes, 4); version != protocol_version)
     throw MalformedMessage(fmt::format("protocol version {} there, {} here; build both programs "
                                        "from the same sources",
                                        version, protocol_version));
+  if (get<std::uint64_t>(bytes, checked_header_size) != checksum(bytes.first(checked_header_size)))
+    throw MalformedMessage("a frame's header is damaged (checksum)");
   const auto type = get<std::uint16_t>(bytes, 6);
   if (!is_known(type))
     throw MalformedMessage(fmt::format("unknown frame type {}", type));
-  return {static_cast<FrameType>(type), get<std::uint64_t>(bytes, 8), get<std::uint64_t>(bytes, 16),
-          get<std::uint64_t>(bytes, 24)};
-}
-
-void check_payload(const FrameHeader &header, std::span<const std::byte> payload) {
-  if (payload.size() != header.length || checksum(payload) != header.checksum)
-    throw MalformedMessage(
-        fmt::format("the payload of a {} frame is damaged (checksum)", name_of(header.type)));
+  return {static_cast<FrameType>(type), get<std::uint64_t>(bytes, 8),
+          get<std::uint64_t>(bytes, 16)};
 }
 
 void PayloadWriter::append(const void *data, std::size_t size) {
   const auto *first = static_cast<const std::byte *>(data);
-  frame_.insert(frame_.end(), first, first + size);
+  own_.insert(own_.end(), first, first + size);
 }
 
 PayloadWriter &PayloadWriter::number(std::uint64_t value) {
@@ -132,23 +120,57 @@ PayloadWriter &PayloadWriter::integers(std::span<const int> values) {
   append(values.data(), values.size_bytes());
   return *this;
 }
+PayloadWriter &PayloadWriter::borrowed(std::span<const double> values) {
+  constexpr std::size_t worth_a_piece = 512; // values; fewer are copied faster than gathered
+  if (values.size() < worth_a_piece)
+    return reals(values);
+  number(values.size());
+  borrowed_.push_back({own_.size(), std::as_bytes(values)});
+  return *this;
+}
+
+std::span<const std::byte> PayloadWriter::bytes() const {
+  assert(borrowed_.empty());
+  return std::span(own_).subspan(header_size);
+}
+
+std::vector<std::span<const std::byte>> PayloadWriter::frame(FrameType type,
+                                                             std::uint64_t sequence) {
+  std::uint64_t length = own_.size() - header_size;
+  std::vector<std::span<const std::byte>> parts;
+  parts.reserve(2 * borrowed_.size() + 1);
+  std::size_t done = 0;
+  for (const Borrowed &lot : borrowed_) {
+    parts.push_back(std::span(own_).subspan(done, lot.at - done));
+    parts.push_back(lot.bytes);
+    length += lot.bytes.size();
+    done = lot.at;
+  }
+  if (done < own_.size())
+    parts.push_back(std::span(own_).subspan(done));
+  write_header(type, sequence, length, own_);
+  return parts;
+}
 
 void PayloadReader::take(void *into, std::size_t size) {
-  if (size > rest_.size())
+  if (size > left_)
     throw MalformedMessage(
-        fmt::format("a payload ends early: {} bytes needed, {} left", size, rest_.size()));
-  if (size > 0)
-    std::memcpy(into, rest_.data(), size);
-  rest_ = rest_.subspan(size);
+        fmt::format("a payload ends early: {} bytes needed, {} left", size, left_));
+  left_ -= size;
+  if (size == 0)
+    return;
+  if (source_)
+    return source_->read({static_cast<std::byte *>(into), size});
+  std::memcpy(into, at_hand_.data(), size);
+  at_hand_ = at_hand_.subspan(size);
 }
 
 // The count is compared with what is left before anything is allocated.
 std::size_t PayloadReader::count(std::size_t element_size) {
   const std::uint64_t n = number();
-  if (n > rest_.size() / element_size)
-    throw MalformedMessage(
-        fmt::format("a payload announces {} values of {} bytes with {} bytes left", n, element_size,
-                    rest_.size()));
+  if (n > left_ / element_size)
+    throw MalformedMessage(fmt::format(
+        "a payload announces {} values of {} bytes with {} bytes left", n, element_size, left_));
   return static_cast<std::size_t>(n);
 }
 
@@ -162,24 +184,30 @@ double PayloadReader::real() {
   take(&value, sizeof value);
   return value;
 }
-std::string PayloadReader::text() {
-  std::string value(count(1), '\0');
-  take(value.data(), value.size());
-  return value;
-}
-std::vector<double> PayloadReader::reals() {
-  std::vector<double> values(count(sizeof(double)));
-  take(values.data(), values.size() * sizeof(double));
+
+template <class Values> Values PayloadReader::grown() {
+  constexpr std::size_t size = sizeof(typename Values::value_type), chunk = (1 << 20) / size;
+  const std::size_t n = count(size);
+  Values values;
+  while (values.size() < n) {
+    const std::size_t have = values.size();
+    values.resize(std::min(n, have + chunk));
+    take(values.data() + have, size * (values.size() - have));
+  }
   return values;
 }
-std::vector<int> PayloadReader::integers() {
-  std::vector<int> values(count(sizeof(int)));
-  take(values.data(), values.size() * sizeof(int));
-  return values;
+std::string PayloadReader::text() { return grown<std::string>(); }
+std::vector<double> PayloadReader::reals() { return grown<std::vector<double>>(); }
+std::vector<int> PayloadReader::integers() { return grown<std::vector<int>>(); }
+
+void PayloadReader::reals(std::span<double> into) {
+  if (const std::size_t n = count(sizeof(double)); n != into.size())
+    throw MalformedMessage(fmt::format("{} values came instead of {}", n, into.size()));
+  take(into.data(), into.size_bytes());
 }
 void PayloadReader::finish() const {
-  if (!rest_.empty())
-    throw MalformedMessage(fmt::format("{} bytes too many at the end of a payload", rest_.size()));
+  if (left_ > 0)
+    throw MalformedMessage(fmt::format("{} bytes too many at the end of a payload", left_));
 }
 
 } // namespace sluice::bridge

@@ -6,7 +6,9 @@
 #include "bridge/transport.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <optional>
 #include <utility>
 
@@ -185,13 +187,23 @@ void check_size(std::string_view field, std::size_t got, const InterfaceMesh &me
         mesh.positions.size(), mesh.n_nodes(), mesh.dim, got);
 }
 
-// What is wrong with the first value that is not finite; "" when all are.
+// True when all values are finite. One pass that neither branches nor leaves early, as it costs as
+// much as the transport of the values otherwise.
+bool copy_finite(std::span<const double> values, std::span<double> copy) {
+  constexpr std::uint64_t exponent = 0x7ff0000000000000u; // all of it set: infinity or no number
+  std::uint64_t bad = 0;
+  for (std::size_t k = 0; k < values.size(); ++k) {
+    bad |= (std::bit_cast<std::uint64_t>(values[k]) & exponent) == exponent;
+    copy[k] = values[k];
+  }
+  return bad == 0;
+}
+
+// What is wrong with the first value that is not finite.
 std::string not_finite(std::string_view field, std::span<const double> values,
                        const InterfaceMesh &mesh, Role role, double time) {
   const auto bad =
       std::find_if_not(values.begin(), values.end(), [](double v) { return std::isfinite(v); });
-  if (bad == values.end())
-    return "";
   const auto node =
       static_cast<std::size_t>(bad - values.begin()) / static_cast<std::size_t>(mesh.dim);
   return fmt::format("bridge: the {}'s {} at t = {:.6g} s is not finite: {} at node {}, reference "
@@ -223,10 +235,10 @@ void Participant::write_data(std::string_view field, std::span<const double> val
   impl_->told([&] {
     auto &written = field_of(impl_->side->writable, field, impl_->role, "writes");
     check_size(field, values.size(), impl_->mesh);
-    if (const auto bad = not_finite(field, values, impl_->mesh, impl_->role, time()); !bad.empty())
-      impl_->fail_window(bad);
-    else
-      written.assign(values.begin(), values.end());
+    if (copy_finite(values, written))
+      return;
+    std::fill(written.begin(), written.end(), 0);
+    impl_->fail_window(not_finite(field, values, impl_->mesh, impl_->role, time()));
   });
 }
 

@@ -50,7 +50,8 @@ public:
   /// `name` is "fluid" or "solid". Reads [bridge] and [case] of the case file; connects nothing
   /// yet. The solid writes `out_dir`/coupling.csv (and balance.csv when totals are reported).
   Participant(std::string name, const Config &config, const std::filesystem::path &out_dir);
-  /// For tests: speaks over `transport`, already connected, instead of a socket.
+  /// Speaks over `transport`, already connected, instead of a socket: between two threads
+  /// (transport_local.hpp) or in one mpirun (transport_mpi.hpp). Nothing: as above.
   Participant(std::string name, const Config &config, const std::filesystem::path &out_dir,
               std::unique_ptr<Transport> transport);
   /// Without finalize (a throw passes through) the partner is sent an abort, best effort.
@@ -79,7 +80,8 @@ public:
   bool requires_reading_checkpoint() const;
 
   /// Own field at the end of this step. Throws UserError for a wrong size, a field that this side
-  /// does not write, or a value that is not finite (naming node and value).
+  /// does not write, or a value that is not finite (naming node and value; where
+  /// windows are halved the window fails, and the field is zero until it is written again).
   void write_data(std::string_view field, std::span<const double> values);
   /// The partner's field at `relative_time` [s] after the current time: in a window of length dt
   /// 0 gives the value at its start, dt the current iterate at its end, linear in between, or on

@@ -26,8 +26,8 @@ Scheme::Scheme(const BridgeSettings &settings, InterfaceState initial, double ex
       accepted_(std::move(initial)), iterate_(accepted_), force_(std::move(initial_force)),
       accepted_force_(force_) {}
 
-IterationRecord Scheme::advance(const InterfaceState &solved, const Eigen::VectorXd &force,
-                                double dt, double dt_next) {
+IterationRecord Scheme::advance(const InterfaceView &solved, const Force &force, double dt,
+                                double dt_next) {
   IterationRecord record = judge(solved, force);
   if (record.verdict == Verdict::converged && settings_.is_implicit())
     finish_window(acceleration_, stacked(iterate_, force_, dt), stacked(solved, force, dt),
@@ -39,7 +39,7 @@ IterationRecord Scheme::advance(const InterfaceState &solved, const Eigen::Vecto
   return record;
 }
 
-IterationRecord Scheme::judge(const InterfaceState &solved, const Eigen::VectorXd &force) {
+IterationRecord Scheme::judge(const InterfaceView &solved, const Force &force) {
   if (!settings_.is_implicit())
     return {Verdict::converged};
   const double gap = (solved.displacement - iterate_.displacement).norm();
@@ -56,7 +56,7 @@ IterationRecord Scheme::judge(const InterfaceState &solved, const Eigen::VectorX
   return record;
 }
 
-bool Scheme::has_converged(const InterfaceState &solved, const Eigen::VectorXd &force, double gap,
+bool Scheme::has_converged(const InterfaceView &solved, const Force &force, double gap,
                            double change) {
   if (iteration_ == 1)
     first_gap_ = gap;
@@ -77,14 +77,15 @@ bool Scheme::has_converged(const InterfaceState &solved, const Eigen::VectorXd &
                                   relative_floor * largest_force_;
 }
 
-void Scheme::accept(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
-                    double dt_next) {
+void Scheme::accept(const InterfaceView &solved, const Force &force, double dt, double dt_next) {
   velocity_before_ = accepted_.velocity;
   dt_before_ = dt;
-  accepted_ = solved;
+  accepted_.displacement = solved.displacement;
+  accepted_.velocity = solved.velocity;
   if (settings_.is_parallel())
     accepted_force_ = force_ = force;
-  iterate_ = settings_.is_implicit() ? prediction(dt_next) : solved;
+  if (settings_.is_implicit())
+    iterate_ = prediction(dt_next);
   last_force_.resize(0);
   first_change_ = 0;
   iteration_ = 1;
@@ -110,8 +111,7 @@ InterfaceState Scheme::prediction(double dt_next) const {
 }
 
 // In metres throughout, so that no field drowns another.
-Eigen::VectorXd Scheme::stacked(const InterfaceState &state, const Eigen::VectorXd &force,
-                                double dt) const {
+Eigen::VectorXd Scheme::stacked(const InterfaceView &state, const Force &force, double dt) const {
   const Eigen::Index n_force = settings_.is_parallel() ? force.size() : 0;
   Eigen::VectorXd x(state.displacement.size() + state.velocity.size() + n_force);
   x << state.displacement, dt * state.velocity, force_scale_ * force.head(n_force);
@@ -119,8 +119,7 @@ Eigen::VectorXd Scheme::stacked(const InterfaceState &state, const Eigen::Vector
 }
 
 // Once for the run: the history of the accelerator is in these units.
-void Scheme::find_force_scale(const InterfaceState &solved, const Eigen::VectorXd &force,
-                              double dt) {
+void Scheme::find_force_scale(const InterfaceView &solved, const Force &force, double dt) {
   if (!settings_.is_parallel() || force_scale_ > 0)
     return;
   const double motion = (solved.displacement - accepted_.displacement).norm() +
@@ -133,13 +132,12 @@ void Scheme::find_force_scale(const InterfaceState &solved, const Eigen::VectorX
 }
 
 // Differences ten times below what counts as converged are taken for noise of the solvers.
-double Scheme::resolution(const InterfaceState &solved, const Eigen::VectorXd &force,
-                          double dt) const {
+double Scheme::resolution(const InterfaceView &solved, const Force &force, double dt) const {
   return 0.1 * settings_.displacement_tolerance *
          (stacked(solved, force, dt) - stacked(accepted_, accepted_force_, dt)).norm();
 }
 
-void Scheme::iterate_again(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
+void Scheme::iterate_again(const InterfaceView &solved, const Force &force, double dt,
                            IterationRecord &record) {
   find_force_scale(solved, force, dt);
   const AcceleratedIterate result =
@@ -153,9 +151,10 @@ void Scheme::iterate_again(const InterfaceState &solved, const Eigen::VectorXd &
   }
   const Eigen::Index n = solved.displacement.size(), m = solved.velocity.size();
   iterate_ = {result.next.head(n), result.next.segment(n, m) / dt};
-  if (settings_.is_parallel())
-    force_ =
-        force_scale_ > 0 ? Eigen::VectorXd(result.next.tail(force.size()) / force_scale_) : force;
+  if (settings_.is_parallel() && force_scale_ > 0)
+    force_ = result.next.tail(force.size()) / force_scale_;
+  else if (settings_.is_parallel())
+    force_ = force;
   ++iteration_;
 }
 

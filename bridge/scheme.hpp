@@ -30,6 +30,15 @@ struct InterfaceState {
   Eigen::VectorXd velocity;     ///< [m/s]; may be empty
 };
 
+/// The same where it lies.
+struct InterfaceView {
+  InterfaceView(const InterfaceState &state)
+      : displacement(state.displacement), velocity(state.velocity) {}
+  InterfaceView(Eigen::Ref<const Eigen::VectorXd> d, Eigen::Ref<const Eigen::VectorXd> v)
+      : displacement(d), velocity(v) {}
+  Eigen::Ref<const Eigen::VectorXd> displacement, velocity;
+};
+
 /// `retry`: the window is given up and starts anew at half its length.
 enum class Verdict { iterate = 0, converged = 1, failed = 2, retry = 3 };
 
@@ -44,6 +53,8 @@ struct IterationRecord {
 
 class Scheme {
 public:
+  using Force = Eigen::Ref<const Eigen::VectorXd>; ///< [N], dim components per node
+
   /// `extent` [m] and `n_nodes` scale the floor of the displacement criterion.
   Scheme(const BridgeSettings &settings, InterfaceState initial, double extent, std::size_t n_nodes,
          Eigen::VectorXd initial_force = {});
@@ -51,7 +62,7 @@ public:
   /// Judges what the solid answered (serial: to `force`, parallel: while the fluid computed
   /// `force`) in a window of length `dt` [s] and moves on: to the window's next iterate, or to the
   /// first of the next window, of length `dt_next` [s].
-  IterationRecord advance(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
+  IterationRecord advance(const InterfaceView &solved, const Force &force, double dt,
                           double dt_next);
 
   /// The window starts anew with the length `dt` [s].
@@ -59,24 +70,22 @@ public:
 
   int iteration() const { return iteration_; }                 ///< of this window, from 1
   const InterfaceState &accepted() const { return accepted_; } ///< at the start of the window
-  const InterfaceState &iterate() const { return iterate_; }   ///< what the fluid computes with
+  /// What the fluid computes with.
+  const InterfaceState &iterate() const { return settings_.is_implicit() ? iterate_ : accepted_; }
   const Eigen::VectorXd &force() const {
     return force_;
   } ///< parallel: what the solid computes with
   std::string explanation(const IterationRecord &record) const; ///< of a failure, with numbers
 
 private:
-  IterationRecord judge(const InterfaceState &solved, const Eigen::VectorXd &force);
-  bool has_converged(const InterfaceState &solved, const Eigen::VectorXd &force, double gap,
-                     double change);
-  void accept(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
-              double dt_next);
-  void iterate_again(const InterfaceState &solved, const Eigen::VectorXd &force, double dt,
+  IterationRecord judge(const InterfaceView &solved, const Force &force);
+  bool has_converged(const InterfaceView &solved, const Force &force, double gap, double change);
+  void accept(const InterfaceView &solved, const Force &force, double dt, double dt_next);
+  void iterate_again(const InterfaceView &solved, const Force &force, double dt,
                      IterationRecord &record);
-  void find_force_scale(const InterfaceState &solved, const Eigen::VectorXd &force, double dt);
-  Eigen::VectorXd stacked(const InterfaceState &state, const Eigen::VectorXd &force,
-                          double dt) const;
-  double resolution(const InterfaceState &solved, const Eigen::VectorXd &force, double dt) const;
+  void find_force_scale(const InterfaceView &solved, const Force &force, double dt);
+  Eigen::VectorXd stacked(const InterfaceView &state, const Force &force, double dt) const;
+  double resolution(const InterfaceView &solved, const Force &force, double dt) const;
   InterfaceState prediction(double dt_next) const;
 
   BridgeSettings settings_;

@@ -37,7 +37,7 @@ private:
 
 /// Table [bridge]: how the participants talk, and how a window is iterated.
 struct BridgeSettings {
-  std::string transport = "unix";               ///< "unix", "shared" (one host) or "tcp"
+  std::string transport = "unix";               ///< "unix", "shared" (one host), "tcp", "mpi"
   std::string address;                          ///< unix: path; tcp: "host:port"; "" derives one
   std::string token;                            ///< shared secret; SLUICE_TOKEN overrides
   std::string scheme = "serial-implicit";       ///< or "serial-explicit", "parallel-implicit", ...
@@ -63,8 +63,8 @@ struct BridgeSettings {
   double initial_relaxation = 0.05;     ///< of the first iteration without history
 
   template <class Reader> void describe(Reader &read) {
-    read("transport", transport, "unix or shared (memory) on one host, tcp")
-        .one_of({"unix", "shared", "tcp"});
+    read("transport", transport, "unix or shared (memory) on one host, tcp, mpi (one mpirun)")
+        .one_of({"unix", "shared", "tcp", "mpi"});
     read("address", address,
          "unix, shared: path of the socket; tcp: host:port, 127.0.0.1:port on one host");
     read("token", token, "shared text that the partner must show; SLUICE_TOKEN overrides it");

@@ -52,13 +52,6 @@ void check_position(PayloadReader &read, long window, int iteration) {
                     there_iteration, window, iteration));
 }
 
-std::vector<double> read_values(PayloadReader &read, std::size_t n) {
-  std::vector<double> values = read.reals();
-  if (values.size() != n)
-    throw MalformedMessage(fmt::format("{} values came instead of {}", values.size(), n));
-  return values;
-}
-
 void write_report(PayloadWriter &write, const MapReport &report) {
   for (const auto count : {report.fluid_nodes, report.solid_nodes, report.fluid_nodes_beyond,
                            report.solid_nodes_reached, report.farthest_node})

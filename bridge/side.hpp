@@ -23,8 +23,11 @@ namespace sluice::bridge {
 struct WindowField {
   std::vector<double> start, end; ///< at the start of the window; the current iterate at its end
   std::vector<double> before;     ///< at the start of the window before; empty in the first
-  /// The window is accepted: the next one starts from `accepted`.
-  void move_on(std::vector<double> accepted) { before = std::exchange(start, std::move(accepted)); }
+  /// The window is accepted: `start` becomes what was before it, and is to be filled anew.
+  void move_on() {
+    before.swap(start);
+    start.resize(before.size());
+  }
 };
 
 /// What both sides know of the run at an exchange.
@@ -72,8 +75,6 @@ InterfaceMesh receive_mesh(Link &link);
 /// programs are not at the same one.
 void write_position(PayloadWriter &write, const Exchange &exchange);
 void check_position(PayloadReader &read, long window, int iteration);
-/// Reads values of which there must be `n`.
-std::vector<double> read_values(PayloadReader &read, std::size_t n);
 /// As the report is sent: the fluid builds the map, the solid learns what it looks like.
 void write_report(PayloadWriter &write, const MapReport &report);
 MapReport read_report(PayloadReader &read);

@@ -7,16 +7,10 @@ namespace sluice::bridge {
 
 namespace {
 
-struct Motion {
-  std::vector<double> displacement, velocity; // of the solid's nodes
-};
-
-// What the solid says to an iteration.
+// What the solid says to an iteration, beside the motion.
 struct Answer {
   Verdict verdict = Verdict::iterate;
   std::string explanation; // of a failure, or of a window that is tried again
-  Motion accepted;         // of the window's end, when it converged in an implicit scheme
-  Motion next;             // to compute with
 };
 
 MapKind kind_of(const std::string &mapping) {
@@ -52,14 +46,18 @@ public:
     send_mesh(link, own);
     InterfaceMesh solid = receive_mesh(link);
     map_ = make_mapping(kind_, own, solid);
-    n_solid_values_ = solid.positions.size();
+    arrived_.resize(solid.positions.size());
+    mapped_.resize(solid.positions.size());
+    for (auto &[name, field] : readable)
+      field.start.resize(own.positions.size());
     send_report(link);
-    const Motion initial = link.receive(FrameType::initial, record_limit(2 * n_solid_values_),
-                                        "the solid's initial displacement and velocity",
-                                        [&](PayloadReader &read) { return read_motion(read); });
-    fill("displacement", initial.displacement);
-    if (has_velocity_)
-      fill("velocity", initial.velocity);
+    link.receive(FrameType::initial, record_limit(2 * solid.positions.size()),
+                 "the solid's initial displacement and velocity", [&](PayloadReader &read) {
+                   read_motion(read, &WindowField::start);
+                   return 0;
+                 });
+    for (auto &[name, field] : readable)
+      field.end = field.start;
     return solid;
   }
 
@@ -71,9 +69,6 @@ public:
       throw UserError(answer.explanation);
     }
     exchange.statistics.halved_windows += answer.verdict == Verdict::retry;
-    update("displacement", answer.verdict, answer.accepted.displacement, answer.next.displacement);
-    if (has_velocity_)
-      update("velocity", answer.verdict, answer.accepted.velocity, answer.next.velocity);
     return answer.verdict;
   }
 
@@ -91,7 +86,7 @@ private:
   void send_report(Link &link) {
     PayloadWriter payload;
     write_report(payload, map_.report());
-    payload.reals(map_.conservative(writable.find("force")->second));
+    payload.borrowed(forces_on_solid());
     link.send(FrameType::map_report, std::move(payload));
   }
 
@@ -99,31 +94,46 @@ private:
     PayloadWriter payload;
     write_position(payload, exchange);
     payload.text(exchange.failure);
-    payload.reals(map_.conservative(writable.find("force")->second));
+    payload.borrowed(forces_on_solid());
     write_totals(payload, over_depth(exchange.totals, map_.depth()));
     exchange.link.send(FrameType::forces, std::move(payload));
   }
 
-  Answer receive_answer(const Exchange &exchange) const {
+  std::span<const double> forces_on_solid() {
+    const std::vector<double> &forces = writable.find("force")->second;
+    if (map_.is_identity())
+      return forces;
+    map_.conservative(forces, mapped_);
+    return mapped_;
+  }
+
+  Answer receive_answer(const Exchange &exchange) {
     const long window = exchange.clock.window();
     return exchange.link.receive(
-        FrameType::iterate, record_limit(4 * n_solid_values_) + longest_text,
-        fmt::format("the answer to iteration {} of window {} (t = {:.6g} s)", exchange.iteration,
-                    window, exchange.clock.start()),
+        FrameType::iterate, record_limit(4 * arrived_.size()) + longest_text,
+        Awaited("the answer to", exchange.iteration, window, exchange.clock.start()),
         [&](PayloadReader &read) {
           check_position(read, window, exchange.iteration);
           return read_answer(read);
         });
   }
 
-  Motion read_motion(PayloadReader &read) const {
-    Motion motion;
-    motion.displacement = read_values(read, n_solid_values_);
-    motion.velocity = read_values(read, has_velocity_ ? n_solid_values_ : 0);
-    return motion;
+  // Both fields, mapped, at one instant of the window.
+  void read_motion(PayloadReader &read, std::vector<double> WindowField::*instant) {
+    read_mapped(read, readable.find("displacement")->second.*instant);
+    if (has_velocity_)
+      read_mapped(read, readable.find("velocity")->second.*instant);
+    else
+      read.reals(std::span<double>());
+  }
+  void read_mapped(PayloadReader &read, std::vector<double> &values) {
+    if (map_.is_identity())
+      return read.reals(values);
+    read.reals(arrived_);
+    map_.consistent(arrived_, values);
   }
 
-  Answer read_answer(PayloadReader &read) const {
+  Answer read_answer(PayloadReader &read) {
     Answer answer;
     const auto verdict = read.number();
     if (verdict > static_cast<std::uint64_t>(Verdict::retry))
@@ -133,30 +143,27 @@ private:
       answer.explanation = read.text();
     if (answer.verdict == Verdict::failed)
       return answer;
-    if (answer.verdict == Verdict::converged && is_implicit_)
-      answer.accepted = read_motion(read);
-    answer.next = read_motion(read);
+    if (answer.verdict == Verdict::converged)
+      read_accepted(read);
+    read_motion(read, &WindowField::end);
     return answer;
   }
 
-  void fill(std::string_view field, const std::vector<double> &values) {
-    const std::vector<double> mapped = map_.consistent(values);
-    readable.find(field)->second = {mapped, mapped, {}};
-  }
-
   // In the explicit scheme the fluid runs a window behind: it starts where it ended.
-  void update(std::string_view field, Verdict verdict, const std::vector<double> &accepted,
-              const std::vector<double> &next) {
-    WindowField &values = readable.find(field)->second;
-    if (verdict == Verdict::converged)
-      values.move_on(is_implicit_ ? map_.consistent(accepted) : values.end);
-    values.end = map_.consistent(next);
+  void read_accepted(PayloadReader &read) {
+    for (auto &[name, field] : readable) {
+      field.move_on();
+      if (!is_implicit_)
+        field.start.swap(field.end);
+    }
+    if (is_implicit_)
+      read_motion(read, &WindowField::start);
   }
 
   bool is_implicit_, has_velocity_;
   MapKind kind_;
   Mapping map_;
-  std::size_t n_solid_values_ = 0;
+  std::vector<double> arrived_, mapped_; // motion and forces at the solid's nodes
 };
 
 } // namespace

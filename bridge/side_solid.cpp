@@ -7,16 +7,16 @@ namespace sluice::bridge {
 
 namespace {
 
-Eigen::VectorXd vector_of(const std::vector<double> &values) {
-  return Eigen::Map<const Eigen::VectorXd>(values.data(), static_cast<Eigen::Index>(values.size()));
+Eigen::Map<const Eigen::VectorXd> vector_of(const std::vector<double> &values) {
+  return {values.data(), static_cast<Eigen::Index>(values.size())};
 }
 
-std::vector<double> values_of(const Eigen::VectorXd &vector) {
-  return {vector.begin(), vector.end()};
+std::span<const double> values_of(const Eigen::VectorXd &vector) {
+  return {vector.data(), static_cast<std::size_t>(vector.size())};
 }
 
 void write_motion(PayloadWriter &write, const InterfaceState &state) {
-  write.reals(values_of(state.displacement)).reals(values_of(state.velocity));
+  write.borrowed(values_of(state.displacement)).borrowed(values_of(state.velocity));
 }
 
 class SolidSide final : public Side {
@@ -29,11 +29,14 @@ public:
     InterfaceMesh fluid = receive_mesh(link);
     send_mesh(link, own);
     n_values_ = own.positions.size();
-    receive_report(link);
     WindowField &force = readable.find("force")->second;
+    force.start.resize(n_values_);
+    receive_report(link, force.start);
     force.end = force.start;
-    scheme_.emplace(settings_, written_motion(), extent(own), own.n_nodes(),
-                    settings_.is_parallel() ? vector_of(force.start) : Eigen::VectorXd());
+    const InterfaceView motion = written_motion();
+    scheme_.emplace(
+        settings_, InterfaceState{motion.displacement, motion.velocity}, extent(own), own.n_nodes(),
+        settings_.is_parallel() ? Eigen::VectorXd(vector_of(force.start)) : Eigen::VectorXd());
     PayloadWriter payload;
     write_motion(payload, scheme_->accepted());
     link.send(FrameType::initial, std::move(payload));
@@ -46,29 +49,26 @@ public:
   // In the parallel schemes the forces of an iteration are needed at its end only.
   void await_window(const Exchange &exchange) override {
     if (!settings_.is_parallel())
-      readable.find("force")->second.end = receive_forces(exchange, 1);
+      receive_forces(exchange, 1, readable.find("force")->second.end);
   }
 
   Verdict advance(const Exchange &exchange) override {
     WindowField &force = readable.find("force")->second;
-    const std::vector<double> computed =
-        settings_.is_parallel() ? receive_forces(exchange, exchange.iteration) : force.end;
-    IterationRecord record = judged(exchange, computed);
-    const std::string reason =
-        record.verdict == Verdict::failed ? explanation(exchange, record) : std::string();
-    if (record.verdict == Verdict::failed && exchange.clock.can_halve()) {
-      record.verdict = Verdict::retry;
-      scheme_->restart_window(exchange.clock.halved_length());
-      ++exchange.statistics.halved_windows;
+    if (settings_.is_parallel()) {
+      computed_.resize(n_values_);
+      receive_forces(exchange, exchange.iteration, computed_);
     }
+    std::vector<double> &computed = settings_.is_parallel() ? computed_ : force.end;
+    const IterationRecord record = answered(exchange, computed);
     log(exchange, record);
-    send_answer(exchange, record.verdict, reason);
-    if (record.verdict == Verdict::converged)
-      force.move_on(computed);
+    if (record.verdict == Verdict::converged) {
+      force.move_on();
+      force.start.swap(computed);
+    }
     if (settings_.is_parallel())
-      force.end = values_of(scheme_->force());
+      force.end.assign(scheme_->force().begin(), scheme_->force().end());
     else if (record.verdict == Verdict::iterate)
-      force.end = receive_forces(exchange, exchange.iteration + 1);
+      receive_forces(exchange, exchange.iteration + 1, force.end);
     return record.verdict;
   }
 
@@ -86,68 +86,98 @@ public:
   const MapReport &map_report() const override { return report_; }
 
 private:
-  InterfaceState written_motion() const {
-    return {vector_of(writable.find("displacement")->second),
-            settings_.has_velocity() ? vector_of(writable.find("velocity")->second)
-                                     : Eigen::VectorXd()};
+  const std::vector<double> &written_velocity() const {
+    return settings_.has_velocity() ? writable.find("velocity")->second : no_values_;
+  }
+  InterfaceView written_motion() const {
+    return {vector_of(writable.find("displacement")->second), vector_of(written_velocity())};
   }
 
-  void receive_report(Link &link) {
-    readable.find("force")->second.start =
-        link.receive(FrameType::map_report, record_limit(n_values_), "the fluid's map",
-                     [&](PayloadReader &read) {
-                       report_ = read_report(read);
-                       return read_values(read, n_values_);
-                     });
+  void receive_report(Link &link, std::vector<double> &initial_forces) {
+    link.receive(FrameType::map_report, record_limit(n_values_), "the fluid's map",
+                 [&](PayloadReader &read) {
+                   report_ = read_report(read);
+                   read.reals(initial_forces);
+                   return 0;
+                 });
   }
 
-  // The verdict on what both sides computed; failed where one of them could not.
-  IterationRecord judged(const Exchange &exchange, const std::vector<double> &force) {
+  // Judges what both sides computed and sends the answer.
+  IterationRecord answered(const Exchange &exchange, const std::vector<double> &force) {
     if (!exchange.failure.empty() || !fluid_failure_.empty())
-      return {Verdict::failed};
+      return given_up(exchange, {Verdict::failed});
+    if (!settings_.is_implicit())
+      return passed_on(exchange, force);
+    const IterationRecord record = moved_on(exchange, force);
+    if (record.verdict == Verdict::failed)
+      return given_up(exchange, record);
+    send_answer(exchange, record.verdict);
+    return record;
+  }
+
+  IterationRecord moved_on(const Exchange &exchange, const std::vector<double> &force) {
     const WindowClock &clock = exchange.clock;
     return scheme_->advance(written_motion(), vector_of(force), clock.window_length(),
                             clock.is_last() ? clock.window_length() : clock.next_window_length());
   }
 
-  std::vector<double> receive_forces(const Exchange &exchange, int iteration) {
+  // The explicit schemes have nothing to judge: the fluid gets what was written at once, and the
+  // scheme takes it over while the fluid computes.
+  IterationRecord passed_on(const Exchange &exchange, const std::vector<double> &force) {
+    PayloadWriter payload = answer(exchange, Verdict::converged);
+    payload.borrowed(writable.find("displacement")->second);
+    payload.borrowed(written_velocity());
+    exchange.link.send(FrameType::iterate, std::move(payload));
+    return moved_on(exchange, force);
+  }
+
+  // The window is tried again at half its length or, where it cannot be halved, ends the run.
+  IterationRecord given_up(const Exchange &exchange, IterationRecord record) {
+    const std::string reason = explanation(exchange, record);
+    if (!exchange.clock.can_halve()) {
+      log(exchange, record);
+      ++exchange.statistics.failed_windows;
+      send_answer(exchange, Verdict::failed, reason);
+      throw UserError(reason);
+    }
+    record.verdict = Verdict::retry;
+    scheme_->restart_window(exchange.clock.halved_length());
+    ++exchange.statistics.halved_windows;
+    send_answer(exchange, Verdict::retry, reason);
+    return record;
+  }
+
+  void receive_forces(const Exchange &exchange, int iteration, std::vector<double> &forces) {
     const long window = exchange.clock.window();
-    std::optional<WindowTotals> totals;
-    std::vector<double> forces =
+    const std::optional<WindowTotals> totals =
         exchange.link.receive(FrameType::forces, record_limit(n_values_ + 16) + longest_text,
-                              fmt::format("the forces of iteration {} of window {} (t = {:.6g} s)",
-                                          iteration, window, exchange.clock.start()),
+                              Awaited("the forces of", iteration, window, exchange.clock.start()),
                               [&](PayloadReader &read) {
                                 check_position(read, window, iteration);
                                 fluid_failure_ = read.text();
-                                auto values = read_values(read, n_values_);
-                                totals = read_totals(read);
-                                return values;
+                                read.reals(forces);
+                                return read_totals(read);
                               });
     if (totals && iteration == 1)
       balance_.add_fluid(*totals, exchange.statistics);
-    return forces;
   }
 
-  void send_answer(const Exchange &exchange, Verdict verdict, const std::string &reason) {
+  static PayloadWriter answer(const Exchange &exchange, Verdict verdict) {
     PayloadWriter payload;
     write_position(payload, exchange);
     payload.number(static_cast<std::uint64_t>(verdict));
-    if (verdict == Verdict::failed || verdict == Verdict::retry)
-      payload.text(reason.substr(0, longest_text / 2));
-    if (verdict != Verdict::failed)
-      write_iterate(payload, verdict);
-    exchange.link.send(FrameType::iterate, std::move(payload));
-    if (verdict != Verdict::failed)
-      return;
-    ++exchange.statistics.failed_windows;
-    throw UserError(reason);
+    return payload;
   }
 
-  void write_iterate(PayloadWriter &payload, Verdict verdict) const {
-    if (verdict == Verdict::converged && settings_.is_implicit())
+  void send_answer(const Exchange &exchange, Verdict verdict, const std::string &reason = "") {
+    PayloadWriter payload = answer(exchange, verdict);
+    if (verdict == Verdict::failed || verdict == Verdict::retry)
+      payload.text(reason.substr(0, longest_text / 2));
+    if (verdict == Verdict::converged)
       write_motion(payload, scheme_->accepted());
-    write_motion(payload, scheme_->iterate());
+    if (verdict != Verdict::failed)
+      write_motion(payload, scheme_->iterate());
+    exchange.link.send(FrameType::iterate, std::move(payload));
   }
 
   std::string explanation(const Exchange &exchange, const IterationRecord &record) const {
@@ -181,6 +211,8 @@ private:
   std::optional<Scheme> scheme_;
   MapReport report_;
   std::size_t n_values_ = 0;
+  std::vector<double> computed_; // forces that the parallel schemes receive
+  const std::vector<double> no_values_;
   std::string fluid_failure_; // of the forces last received
 };
 

@@ -27,13 +27,19 @@ public:
   using std::runtime_error::runtime_error;
 };
 
+/// Pieces of memory that are sent one after the other as if they were one.
+using Pieces = std::span<const std::span<const std::byte>>;
+
 class Transport {
 public:
   virtual ~Transport() = default;
 
-  /// Sends some of `bytes` (at least one) and returns how many; 0 when `deadline` passed first.
-  /// Throws ConnectionLost.
-  virtual std::size_t write_some(std::span<const std::byte> bytes, Deadline deadline) = 0;
+  /// Sends some of `pieces` (at least one byte of the first, which is not empty) and returns how
+  /// many bytes; 0 when `deadline` passed first. Throws ConnectionLost.
+  virtual std::size_t write_some(Pieces pieces, Deadline deadline) = 0;
+  std::size_t write_some(std::span<const std::byte> bytes, Deadline deadline) {
+    return write_some(Pieces(&bytes, 1), deadline);
+  }
   /// Receives at least one byte and returns how many; 0 when `deadline` passed first. Throws
   /// ConnectionLost, also at the orderly end of the stream.
   virtual std::size_t read_some(std::span<std::byte> bytes, Deadline deadline) = 0;

@@ -57,9 +57,7 @@ public:
   LocalTransport(const LocalTransport &) = delete;
   LocalTransport &operator=(const LocalTransport &) = delete;
 
-  std::size_t write_some(std::span<const std::byte> bytes, Deadline) override {
-    return out_->push(bytes);
-  }
+  std::size_t write_some(Pieces pieces, Deadline) override { return out_->push(pieces.front()); }
   std::size_t read_some(std::span<std::byte> bytes, Deadline deadline) override {
     return in_->pop(bytes, deadline);
   }

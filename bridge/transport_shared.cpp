@@ -10,6 +10,7 @@
 
 #include <linux/futex.h>
 #include <poll.h>
+#include <sched.h>
 #include <sys/mman.h>
 #include <sys/socket.h>
 #include <sys/syscall.h>
@@ -22,8 +23,9 @@ namespace {
 using Counter = std::atomic<std::uint32_t>;
 static_assert(Counter::is_always_lock_free && sizeof(Counter) == 4, "the kernel waits on 4 bytes");
 
-constexpr std::uint32_t capacity = 1 << 22; // [bytes] each way, a power of two
-constexpr auto spinning = std::chrono::microseconds(20);
+constexpr std::uint32_t capacity = 1 << 20; // [bytes] each way, a power of two; fits into a cache
+constexpr std::uint32_t lot = 1 << 15;      // [bytes] shown to the reader while more is copied
+constexpr auto looking = std::chrono::microseconds(50); // what a sleep and its end would cost
 constexpr long nap = 20'000'000; // [ns] between two looks whether the partner lives
 
 // Counters run freely and wrap; their difference is what lies in the ring.
@@ -37,6 +39,7 @@ struct Ring {
 
 struct Block {
   Ring to_listener, to_connector;
+  alignas(64) std::atomic<int> listener_core{-1}, connector_core{-1}; // where they last waited
 };
 
 void wake(Counter &word) {
@@ -73,21 +76,33 @@ public:
   SharedTransport(SocketHandle socket, std::unique_ptr<Mapping> memory, bool is_listener)
       : socket_(std::move(socket)), memory_(std::move(memory)),
         in_(is_listener ? memory_->block().to_listener : memory_->block().to_connector),
-        out_(is_listener ? memory_->block().to_connector : memory_->block().to_listener) {}
+        out_(is_listener ? memory_->block().to_connector : memory_->block().to_listener),
+        own_core_(is_listener ? memory_->block().listener_core : memory_->block().connector_core),
+        other_core_(is_listener ? memory_->block().connector_core
+                                : memory_->block().listener_core) {}
 
-  std::size_t write_some(std::span<const std::byte> bytes, Deadline deadline) override {
-    const std::uint32_t written = out_.written.load(std::memory_order_relaxed);
-    const auto room = [&] { return capacity - checked(written - out_.read.load()); };
+  std::size_t write_some(Pieces pieces, Deadline deadline) override {
+    const std::uint32_t start = out_.written.load(std::memory_order_relaxed);
+    std::uint32_t end = start;
+    const auto room = [&] { return capacity - checked(end - out_.read.load()); };
     if (!wait(out_.read, out_.writer_sleeps, deadline, [&] { return room() > 0; }))
       return 0;
-    const std::uint32_t n = std::min<std::size_t>(room(), bytes.size());
-    const std::uint32_t at = written % capacity, first = std::min(n, capacity - at);
-    std::memcpy(out_.bytes + at, bytes.data(), first);
-    std::memcpy(out_.bytes, bytes.data() + first, n - first);
-    out_.written.store(written + n);
-    if (out_.reader_sleeps.load() != 0)
-      wake(out_.written);
-    return n;
+    std::uint32_t shown = start;
+    for (std::span<const std::byte> piece : pieces) {
+      while (!piece.empty() && room() > 0) {
+        const std::uint32_t n = std::min<std::size_t>({piece.size(), room(), lot});
+        put(end, piece.first(n));
+        end += n;
+        piece = piece.subspan(n);
+        if (end - shown >= lot)
+          show(shown = end);
+      }
+      if (!piece.empty())
+        break;
+    }
+    if (end != shown)
+      show(end);
+    return end - start;
   }
 
   std::size_t read_some(std::span<std::byte> bytes, Deadline deadline) override {
@@ -110,6 +125,18 @@ public:
   }
 
 private:
+  void put(std::uint32_t position, std::span<const std::byte> bytes) {
+    const std::uint32_t at = position % capacity;
+    const std::size_t first = std::min<std::size_t>(bytes.size(), capacity - at);
+    std::memcpy(out_.bytes + at, bytes.data(), first);
+    std::memcpy(out_.bytes, bytes.data() + first, bytes.size() - first);
+  }
+  void show(std::uint32_t written) {
+    out_.written.store(written);
+    if (out_.reader_sleeps.load() != 0)
+      wake(out_.written);
+  }
+
   // The other side's counter is not to be believed blindly.
   static std::uint32_t checked(std::uint32_t n) {
     if (n > capacity)
@@ -127,15 +154,11 @@ private:
   // is still delivered.
   template <class Ready>
   bool wait(Counter &word, Counter &sleeps, Deadline deadline, Ready &&is_ready) const {
-    const Deadline patience = std::min(deadline, Clock::now() + spinning);
-    while (!is_ready()) {
-      if (Clock::now() < patience) {
-        __builtin_ia32_pause();
-        continue;
-      }
+    bool is_there = comes_soon(is_ready);
+    while (!is_there) {
       const bool is_gone = is_partner_gone();
       if (is_ready())
-        break;
+        return true;
       if (is_gone)
         throw ConnectionLost("end of stream");
       if (Clock::now() >= deadline)
@@ -145,13 +168,33 @@ private:
       if (!is_ready())
         sleep_while(word, value);
       sleeps.store(0);
+      is_there = is_ready();
     }
     return true;
+  }
+
+  // What is about to come is not worth a sleep, from which the kernel takes longer to wake a thread
+  // than a small frame takes there and back; but the partner must have a core to send it from.
+  template <class Ready> bool comes_soon(Ready &&is_ready) const {
+    if (is_ready())
+      return true;
+    const int core = ::sched_getcpu();
+    own_core_.store(core, std::memory_order_relaxed);
+    if (core == other_core_.load(std::memory_order_relaxed))
+      return false;
+    for (const Deadline patience = Clock::now() + looking; Clock::now() < patience;)
+      for (int look = 0; look < 16; ++look) {
+        if (is_ready())
+          return true;
+        __builtin_ia32_pause();
+      }
+    return false;
   }
 
   SocketHandle socket_;
   std::unique_ptr<Mapping> memory_;
   Ring &in_, &out_;
+  std::atomic<int> &own_core_, &other_core_;
 };
 
 // One byte with the descriptor beside it, as POSIX passes descriptors.

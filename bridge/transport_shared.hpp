@@ -2,7 +2,8 @@
 // Shared memory of two processes on one host: a ring of bytes each way in a block without a name
 // (memfd), which the listening side passes over a Unix-domain socket. The socket stays open: its
 // end is how either side learns at once that the other has died, and nothing is left behind. A wait
-// spins for some microseconds and then sleeps in the kernel (futex).
+// looks for some microseconds, where the partner has another core, and then sleeps in the kernel
+// (futex).
 #pragma once
 
 #include "bridge/transport.hpp"

@@ -4,12 +4,14 @@
 #include "bridge/base/check.hpp"
 #include "bridge/transport_shared.hpp"
 
+#include <array>
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
 #include <utility>
 
+#include <fcntl.h>
 #include <netdb.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
@@ -101,18 +103,30 @@ bool wait_for(int descriptor, short events, Deadline deadline) {
 
 bool is_temporary(int error) { return error == EAGAIN || error == EWOULDBLOCK || error == EINTR; }
 
+// Blocks in the kernel, which wakes the thread when there is something to do: looking again and
+// again would take the core from the partner where the two share one.
 class SocketTransport final : public Transport {
 public:
-  explicit SocketTransport(SocketHandle socket) : socket_(std::move(socket)) {}
+  explicit SocketTransport(SocketHandle socket) : socket_(std::move(socket)) {
+    ::fcntl(socket_.get(), F_SETFL, ::fcntl(socket_.get(), F_GETFL) & ~O_NONBLOCK);
+    for (const int direction : {SO_RCVTIMEO, SO_SNDTIMEO})
+      ::setsockopt(socket_.get(), SOL_SOCKET, direction, &slice, sizeof slice);
+  }
 
-  std::size_t write_some(std::span<const std::byte> bytes, Deadline deadline) override {
-    return repeat(POLLOUT, deadline, [&] {
-      return ::send(socket_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL | MSG_DONTWAIT);
-    });
+  std::size_t write_some(Pieces pieces, Deadline deadline) override {
+    std::array<iovec, 16> list;
+    msghdr message{};
+    message.msg_iov = list.data();
+    message.msg_iovlen = std::min(pieces.size(), list.size());
+    std::transform(pieces.begin(), pieces.begin() + static_cast<std::ptrdiff_t>(message.msg_iovlen),
+                   list.begin(), [](std::span<const std::byte> piece) {
+                     return iovec{const_cast<std::byte *>(piece.data()), piece.size()};
+                   });
+    return repeat(deadline, [&] { return ::sendmsg(socket_.get(), &message, MSG_NOSIGNAL); });
   }
   std::size_t read_some(std::span<std::byte> bytes, Deadline deadline) override {
-    return repeat(POLLIN, deadline, [&] {
-      const auto n = ::recv(socket_.get(), bytes.data(), bytes.size(), MSG_DONTWAIT);
+    return repeat(deadline, [&] {
+      const auto n = ::recv(socket_.get(), bytes.data(), bytes.size(), 0);
       if (n == 0)
         throw ConnectionLost("end of stream");
       return n;
@@ -121,14 +135,15 @@ public:
   bool can_write() override { return wait_for(socket_.get(), POLLOUT, Clock::now()); }
 
 private:
-  // Tries, and sleeps in poll() while the socket has nothing to give or no room.
-  template <class Attempt> std::size_t repeat(short events, Deadline deadline, Attempt &&attempt) {
+  static constexpr timeval slice{0, 50'000}; // [us] of one attempt, how late a deadline may be
+
+  template <class Attempt> std::size_t repeat(Deadline deadline, Attempt &&attempt) {
     while (true) {
       if (const auto n = attempt(); n > 0)
         return static_cast<std::size_t>(n);
       if (!is_temporary(errno))
         throw ConnectionLost(system_text(errno));
-      if (!wait_for(socket_.get(), events, deadline))
+      if (Clock::now() >= deadline)
         return 0;
     }
   }

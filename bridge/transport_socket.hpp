@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Stream sockets: Unix-domain on one host, TCP otherwise; with shared memory (transport_shared.hpp)
 // the Unix-domain socket is where the two meet. The fluid listens, the solid connects and retries
-// until its deadline, so that either program may start first. Every wait blocks in poll().
+// until its deadline, so that either program may start first. Every wait blocks in the kernel.
 #pragma once
 
 #include "bridge/settings.hpp"

@@ -1,14 +1,17 @@
 // SPDX-License-Identifier: MIT
 // Round trip of one advance between two processes of one host: three components per node each way,
-// serial-explicit, matching nodes (the map is the identity; its cost is reported apart), next to a
-// bare TCP ping-pong of the same bytes in the same run. Prints a Markdown table of medians
-// (minima). Usage: round_trip_benchmark [largest number of nodes, default 100000]
+// serial-explicit, nodes that match, next to a bare TCP ping-pong of the same bytes in the same
+// run. The time of advance() includes what the partner does meanwhile: read_data and write_data of
+// all values. Prints a Markdown table of medians (minima) in microseconds. Usage:
+//   round_trip_benchmark [own | free] [largest number of nodes, default 100000]
+// own (default): each process stays on a core of its own; free: as the scheduler places them.
 #include "bridge/mapping.hpp"
 #include "bridge/participant.hpp"
 
 #include <arpa/inet.h>
 #include <fmt/format.h>
 #include <netinet/tcp.h>
+#include <sched.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -40,13 +43,37 @@ template <class Body> double timed(Body &&body) {
   return Microseconds(std::chrono::steady_clock::now() - begin).count();
 }
 
-Times times_of(std::vector<double> samples) {
-  samples.erase(samples.begin(), samples.begin() + static_cast<std::ptrdiff_t>(samples.size() / 5));
-  std::sort(samples.begin(), samples.end());
-  return {samples[samples.size() / 2], samples.front()};
-}
+// The measurements take turns, as a machine is never the same for long.
+constexpr int rounds = 6;
+long repetitions(std::size_t n_nodes) { return n_nodes > 20000 ? 40 : 500; } // of a round
 
-long repetitions(std::size_t n_nodes) { return n_nodes > 20000 ? 150 : 1500; }
+class Samples {
+public:
+  /// The first fifth of a round warms up.
+  void add(const std::vector<double> &round) {
+    const auto warm = round.begin() + static_cast<std::ptrdiff_t>(round.size() / 5);
+    all_.insert(all_.end(), warm, round.end());
+  }
+  Times times() {
+    std::sort(all_.begin(), all_.end());
+    return {all_[all_.size() / 2], all_.front()};
+  }
+
+private:
+  std::vector<double> all_;
+};
+
+// Parent and child of a measurement.
+enum class Program { measuring = 0, answering = 1 };
+bool has_own_core = true;
+
+void take_place(Program program) {
+  cpu_set_t cores;
+  CPU_ZERO(&cores);
+  CPU_SET(static_cast<int>(program), &cores);
+  if (has_own_core)
+    ::sched_setaffinity(0, sizeof cores, &cores);
+}
 
 // ---- bare TCP -----------------------------------------------------------------------------------
 
@@ -61,7 +88,7 @@ void receive_all(int socket, std::vector<char> &bytes) {
         std::max<ssize_t>(0, ::recv(socket, bytes.data() + k, bytes.size() - k, 0)));
 }
 
-Times bare_tcp(std::size_t n_nodes) {
+std::vector<double> bare_tcp(std::size_t n_nodes) {
   const long n = repetitions(n_nodes);
   std::vector<char> bytes(24 * n_nodes, 'x');
   const int listener = ::socket(AF_INET, SOCK_STREAM, 0);
@@ -75,6 +102,7 @@ Times bare_tcp(std::size_t n_nodes) {
   const int on = 1;
   const pid_t child = ::fork();
   if (child == 0) {
+    take_place(Program::answering);
     const int socket = ::socket(AF_INET, SOCK_STREAM, 0);
     ::connect(socket, reinterpret_cast<sockaddr *>(&address), sizeof address);
     ::setsockopt(socket, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
@@ -95,7 +123,7 @@ Times bare_tcp(std::size_t n_nodes) {
   ::waitpid(child, nullptr, 0);
   ::close(socket);
   ::close(listener);
-  return times_of(samples);
+  return samples;
 }
 
 // ---- the bridge ---------------------------------------------------------------------------------
@@ -129,77 +157,91 @@ void echo(const Config &config, const std::string &folder, std::size_t n_nodes) 
 }
 
 struct RoundTrip {
-  Times advance;
-  double start_up = 0; // [us] from nothing to the first data, both processes started together
+  Samples advance, copies, start_up; // start-up: from nothing to the first data, of both processes
 };
 
-RoundTrip through_bridge(const std::string &transport, std::size_t n_nodes) {
+void through_bridge(const std::string &transport, std::size_t n_nodes, RoundTrip &result) {
   std::string folder = std::filesystem::temp_directory_path() / "sluice-round-trip-XXXXXX";
   if (!::mkdtemp(folder.data()))
     std::abort();
   const Config config = config_for(transport, repetitions(n_nodes));
-  RoundTrip result;
   const pid_t child = ::fork();
   if (child == 0) {
+    take_place(Program::answering);
     echo(config, folder, n_nodes);
     ::_exit(0);
   }
-  std::vector<double> values(3 * n_nodes, 1.0), samples;
+  std::vector<double> values(3 * n_nodes, 1.0), advance, copies;
   std::optional<Participant> bridge;
-  result.start_up = timed([&] {
+  result.start_up.add({timed([&] {
     bridge.emplace("fluid", config, folder);
     bridge->set_mesh(nodes_on_a_line(n_nodes));
     bridge->initialize();
-  });
-  while (bridge->is_coupling_ongoing())
-    samples.push_back(timed([&] {
-      bridge->write_data("force", values);
-      bridge->advance(1);
-      bridge->read_data("displacement", 0, values);
-    }));
+  })});
+  while (bridge->is_coupling_ongoing()) {
+    const double write = timed([&] { bridge->write_data("force", values); });
+    advance.push_back(timed([&] { bridge->advance(1); }));
+    copies.push_back(write + timed([&] { bridge->read_data("displacement", 0, values); }));
+  }
   bridge->finalize();
   bridge.reset();
   ::waitpid(child, nullptr, 0);
   std::filesystem::remove_all(folder);
-  result.advance = times_of(samples);
-  return result;
+  result.advance.add(advance);
+  result.copies.add(copies);
 }
 
-// Both products with the identity, as the fluid's side does them in a round trip.
+// Both products with as many entries as nodes: what any other map costs at least, which the bridge
+// leaves out where the nodes match.
 double map_cost(std::size_t n_nodes) {
   const InterfaceMesh mesh = nodes_on_a_line(n_nodes);
   const Mapping map = make_mapping(MapKind::nearest, mesh, mesh);
-  const std::vector<double> values(3 * n_nodes, 1.0);
-  std::vector<double> samples;
+  std::vector<double> values(3 * n_nodes, 1.0), mapped(3 * n_nodes);
+  std::vector<double> times;
   for (int k = 0; k < 50; ++k)
-    samples.push_back(timed([&] {
-      map.conservative(values);
-      map.consistent(values);
+    times.push_back(timed([&] {
+      map.conservative(values, mapped);
+      map.consistent(mapped, values);
     }));
-  return times_of(samples).median;
+  Samples samples;
+  samples.add(times);
+  return samples.times().median;
+}
+
+void print_row(std::size_t n_nodes) {
+  Samples bare;
+  RoundTrip tcp, local, shared;
+  for (int round = 0; round < rounds; ++round) {
+    bare.add(bare_tcp(n_nodes));
+    through_bridge("tcp", n_nodes, tcp);
+    through_bridge("unix", n_nodes, local);
+    through_bridge("shared", n_nodes, shared);
+  }
+  const Times reference = bare.times();
+  fmt::print("| {} | {}", n_nodes, reference.text());
+  for (RoundTrip *trip : {&tcp, &local, &shared}) {
+    const Times times = trip->advance.times();
+    fmt::print(" | {} | {:.2f} ({:.2f})", times.text(), times.median / reference.median,
+               times.least / reference.least);
+  }
+  fmt::print(" | {:.0f} | {:.0f}", shared.copies.times().median, map_cost(n_nodes));
+  for (RoundTrip *trip : {&tcp, &local, &shared})
+    fmt::print("{} {:.1f}", trip == &tcp ? " |" : ",", 1e-3 * trip->start_up.times().median);
+  fmt::print(" |\n");
+  std::fflush(stdout);
 }
 
 } // namespace
 
 int main(int argc, char **argv) {
-  const long largest = argc > 1 ? std::atol(argv[1]) : 100000;
-  fmt::print("| nodes | bare TCP | tcp | ratio | unix | ratio | shared | ratio | of which map | "
-             "start-up ms (tcp, unix, shared) |\n|---|---|---|---|---|---|---|---|---|---|\n");
-  for (const long nodes : {1L, 100L, 1000L, 10000L, 100000L}) {
-    if (nodes > largest)
-      break;
-    const auto n = static_cast<std::size_t>(nodes);
-    const Times bare = bare_tcp(n);
-    const RoundTrip tcp = through_bridge("tcp", n), local = through_bridge("unix", n),
-                    shared = through_bridge("shared", n);
-    const double map = map_cost(n);
-    const auto ratio = [&](const RoundTrip &trip) {
-      return fmt::format("{:.2f}", (trip.advance.median - map) / bare.median);
-    };
-    fmt::print("| {} | {} | {} | {} | {} | {} | {} | {} | {:.0f} | {:.0f}, {:.0f}, {:.0f} |\n",
-               nodes, bare.text(), tcp.advance.text(), ratio(tcp), local.advance.text(),
-               ratio(local), shared.advance.text(), ratio(shared), map, 1e-3 * tcp.start_up,
-               1e-3 * local.start_up, 1e-3 * shared.start_up);
-    std::fflush(stdout);
-  }
+  has_own_core = argc < 2 || std::string(argv[1]) != "free";
+  const long largest = argc > 2 ? std::atol(argv[2]) : 100000;
+  take_place(Program::measuring);
+  fmt::print(
+      "| nodes | bare TCP | tcp | ratio | unix | ratio | shared | ratio | own write and read "
+      "| map, if not identity | start-up ms (tcp, unix, shared) |\n"
+      "|---|---|---|---|---|---|---|---|---|---|---|\n");
+  for (const long nodes : {1L, 100L, 1000L, 10000L, 100000L})
+    if (nodes <= largest)
+      print_row(static_cast<std::size_t>(nodes));
 }

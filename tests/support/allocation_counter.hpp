@@ -6,5 +6,7 @@ namespace sluice::testing {
 
 /// Calls of operator new since the program began.
 long allocations();
+/// [bytes] that they asked for.
+long allocated_bytes();
 
 } // namespace sluice::testing

@@ -4,6 +4,7 @@
 #include "bridge/run_summary.hpp"
 #include "bridge/transport_local.hpp"
 #include "piston.hpp"
+#include "tests/support/allocation_counter.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -152,6 +153,63 @@ TEST(Participant, the_summary_has_the_keys_that_scripts_read) {
   EXPECT_GT(summary["coupling_iterations_mean"], 1.0);
   for (const auto *key : {"ms_per_step_bridge", "wait_s", "force_balance_max", "work_balance_max"})
     EXPECT_TRUE(summary.contains(key)) << key;
+}
+
+// ---- what an advance costs ----------------------------------------------------------------------
+
+struct Cost {
+  long bytes_allocated;                     // per window, by both sides
+  std::uint64_t bytes_sent, bytes_received; // per window, by the fluid
+};
+
+// Both sides run explicit windows on nodes that match; the fluid counts when all buffers are there.
+Cost cost_of_window(std::size_t n_nodes) {
+  constexpr int windows = 30, warm = 10;
+  const TemporaryFolder folder;
+  const auto config = Config::parse(
+      fmt::format("[case]\nend_time_s = {}\ntime_step_s = 1\n[bridge]\nscheme = "
+                  "\"serial-explicit\"\nmapping = \"nearest\"\nmotion = \"displacement\"\n",
+                  windows),
+      "cost.toml");
+  const auto run = [&](const std::string &name, const char *read, const char *write,
+                       const std::function<void(const Participant &)> &after_window) {
+    Participant bridge(name, config, folder.path());
+    InterfaceMesh mesh{3, 3, {}, {}};
+    for (std::size_t k = 0; k < n_nodes; ++k)
+      mesh.positions.insert(mesh.positions.end(), {static_cast<double>(k), 0, 0});
+    bridge.set_mesh(mesh);
+    bridge.initialize();
+    std::vector<double> values(3 * n_nodes);
+    while (bridge.is_coupling_ongoing()) {
+      bridge.read_data(read, bridge.max_time_step_size(), values);
+      bridge.write_data(write, values);
+      bridge.advance(bridge.max_time_step_size());
+      after_window(bridge);
+    }
+    bridge.finalize();
+  };
+  std::thread solid([&] { run("solid", "force", "displacement", [](const Participant &) {}); });
+  Cost start{}, end{};
+  run("fluid", "displacement", "force", [&](const Participant &bridge) {
+    if (const long n = bridge.statistics().windows; n == warm || n == windows)
+      (n == warm ? start : end) = {sluice::testing::allocated_bytes(),
+                                   bridge.statistics().bytes_sent,
+                                   bridge.statistics().bytes_received};
+  });
+  solid.join();
+  constexpr int n = windows - warm;
+  return {(end.bytes_allocated - start.bytes_allocated) / n,
+          (end.bytes_sent - start.bytes_sent) / n, (end.bytes_received - start.bytes_received) / n};
+}
+
+TEST(Participant, an_advance_is_one_frame_each_way_and_copies_no_field_into_new_memory) {
+  constexpr std::size_t n_nodes = 5000, field = 3 * sizeof(double) * n_nodes;
+  const Cost cost = cost_of_window(n_nodes);
+  fmt::print("{} bytes of fields: {} sent, {} received, {} allocated\n", field, cost.bytes_sent,
+             cost.bytes_received, cost.bytes_allocated);
+  EXPECT_EQ(cost.bytes_sent, field + header_size + 5 * 8);     // position, text, count, totals
+  EXPECT_EQ(cost.bytes_received, field + header_size + 5 * 8); // position, verdict, two counts
+  EXPECT_LT(cost.bytes_allocated, 10000); // records, texts; none as long as a field
 }
 
 TEST(Participant, no_socket_file_is_left_behind_and_a_stale_one_is_no_obstacle) {

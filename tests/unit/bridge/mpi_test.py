@@ -1,0 +1,94 @@
+#!/usr/bin/python3
+# SPDX-License-Identifier: MIT
+"""Two programs in one mpirun, each on any number of ranks: the same answer whatever the numbers."""
+import math
+import os
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+PROGRAM = os.environ["SLUICE_MPI_PISTON"]
+WINDOWS, STEP = 20, 1e-3
+CASE = f"""
+[case]
+name = "piston"
+end_time_s = {WINDOWS * STEP}
+time_step_s = {STEP}
+[bridge]
+transport = "TRANSPORT"
+displacement_tolerance = 1e-10
+force_tolerance = 1e-10
+connect_deadline_s = 20
+"""
+ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+        "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}
+MPIRUN = ["mpirun", "--oversubscribe", "--bind-to", "none"]
+# A mass of 1 kg with 5 kg of water on a spring, both by the trapezoidal rule, from 0.01 m at rest.
+HALF = STEP / 2 * math.sqrt(4e4 / 6)
+EXACT = [0.01 * math.cos(n * 2 * math.atan(HALF)) for n in range(1, WINDOWS + 1)]
+
+
+class TwoPrograms(unittest.TestCase):
+    def run_both(self, n_fluid, n_solid, **environment):
+        with tempfile.TemporaryDirectory() as folder:
+            case = Path(folder) / "case.toml"
+            case.write_text(CASE.replace("TRANSPORT", "mpi"))
+            return subprocess.run(
+                MPIRUN + ["-n", str(n_fluid), PROGRAM, "fluid", case, folder, ":",
+                          "-n", str(n_solid), PROGRAM, "solid", case, folder],
+                capture_output=True, text=True, timeout=120, env=os.environ | ROOT | environment)
+
+    def history(self, answer):
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        return [float(line) for line in answer.stdout.split()]
+
+    def test_three_to_two_uneven_ranks_give_what_one_to_one_gives(self):
+        one, many = (self.history(self.run_both(*n)) for n in ((1, 1), (3, 2)))
+        self.assertEqual(len(one), WINDOWS)
+        difference = max(abs(a - b) for a, b in zip(one, many)) / max(map(abs, one))
+        print(f"3 to 2 ranks differ from 1 to 1 by {difference:.1e}")
+        # Sums over the ranks round differently: 4 terms, times the added mass, times the windows.
+        self.assertLess(difference, 1e-13)
+        # The tolerance of a window adds up over the windows.
+        for d, exact in zip(one, EXACT):
+            self.assertAlmostEqual(d, exact, delta=0.01 * WINDOWS * 1e-10)
+
+    def test_a_rank_that_fails_ends_all_with_its_message(self):
+        for rank in ("fluid:1", "solid:1", "solid:0"):
+            answer = self.run_both(2, 2, BAD_RANK=rank)
+            self.assertNotEqual(answer.returncode, 0)
+            number = rank.split(":")[1]
+            said = [line for line in answer.stderr.splitlines()
+                    if f"the solver of rank {number} broke down" in line and line.startswith("[")]
+            self.assertEqual(len(said), 4, answer.stderr)  # every rank of both programs
+
+    def test_one_program_alone_is_told_what_is_missing(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = Path(folder) / "case.toml"
+            case.write_text(CASE.replace("TRANSPORT", "mpi"))
+            answer = subprocess.run(MPIRUN + ["-n", "2", PROGRAM, "fluid", case, folder],
+                                    capture_output=True, text=True, timeout=60,
+                                    env=os.environ | ROOT)
+        self.assertNotEqual(answer.returncode, 0)
+        self.assertIn("has 2 ranks and none of them is the solid", answer.stderr)
+
+    def test_ranks_may_meet_the_partner_over_a_socket_too(self):
+        with tempfile.TemporaryDirectory() as folder:
+            case = Path(folder) / "case.toml"
+            case.write_text(CASE.replace("TRANSPORT", "unix"))
+            environment = os.environ | ROOT | {"SPLIT": "0"}
+            fluid = subprocess.Popen(MPIRUN + ["-n", "2", PROGRAM, "fluid", case, folder],
+                                     env=environment)
+            try:
+                answer = subprocess.run(MPIRUN + ["-n", "3", PROGRAM, "solid", case, folder],
+                                        capture_output=True, text=True, timeout=60,
+                                        env=environment)
+                self.assertEqual(len(self.history(answer)), WINDOWS)
+                self.assertEqual(fluid.wait(20), 0)
+            finally:
+                fluid.kill()
+                fluid.wait()
+
+
+unittest.main()
