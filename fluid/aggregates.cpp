@@ -17,7 +17,7 @@ void sum_magnitudes(const SlicedPattern &pattern, const std::vector<float> &off_
                     std::vector<float> &sum) {
   sum.resize(pattern.rows);
   constexpr int lanes = SlicedPattern::lanes;
-  for_each_index(pattern.slices(), [&](int s) {
+  const auto sum_slice = [&](int s) {
     Floats total{};
     for (int k = pattern.slice_start[s]; k < pattern.slice_start[s + 1]; ++k) {
       const Floats v = load(&off_diagonal[static_cast<std::size_t>(k) * lanes]);
@@ -25,6 +25,10 @@ void sum_magnitudes(const SlicedPattern &pattern, const std::vector<float> &off_
     }
     for (int i = s * lanes; i < std::min(pattern.rows, (s + 1) * lanes); ++i)
       sum[i] = total[i % lanes];
+  };
+  for_each_block(pattern.rows, [&](IndexRange range, int) {
+    for (int first = range.begin; first < range.end; first += lanes)
+      sum_slice(first / lanes);
   });
 }
 

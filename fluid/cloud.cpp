@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/cloud.hpp"
 
+#include "fluid/known_cells.hpp"
 #include "fluid/parallel.hpp"
 #include "fluid/voronoi_cell.hpp"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -57,26 +60,35 @@ void drop_hidden_neighbours(const Points<dim> &points, const Walls<dim> &walls, 
   });
 }
 
-// Unit vectors along which a box is cut to come near a ball: an octagon, and in space a body of 26
-// faces.
-template <int dim> std::vector<Vec<dim>> directions_between_axes() {
-  if constexpr (dim == 2) {
-    const double s = std::numbers::sqrt2 / 2;
-    return {{s, s}, {-s, s}, {-s, -s}, {s, -s}};
-  } else {
-    std::vector<Vec<3>> directions;
-    for (int x = -1; x <= 1; ++x)
-      for (int y = -1; y <= 1; ++y)
-        for (int z = -1; z <= 1; ++z)
-          if (const Vec<3> n(x, y, z); n.squaredNorm() > 1)
-            directions.push_back(n.normalized());
-    return directions;
-  }
+// Unit vectors along which a plane or space is cut to come near a ball: an octagon, and in space a
+// body of 26 faces. Those along the axes come last.
+template <int dim> const auto &directions_of_ball() {
+  static const auto directions = [] {
+    std::array<Vec<dim>, dim == 2 ? 8 : 26> n;
+    int count = 0;
+    if constexpr (dim == 2) {
+      const double s = std::numbers::sqrt2 / 2;
+      for (const Vec<2> &diagonal : {Vec<2>(s, s), Vec<2>(-s, s), Vec<2>(-s, -s), Vec<2>(s, -s)})
+        n[count++] = diagonal;
+    } else {
+      for (int x = -1; x <= 1; ++x)
+        for (int y = -1; y <= 1; ++y)
+          for (int z = -1; z <= 1; ++z)
+            if (const Vec<3> v(x, y, z); v.squaredNorm() > 1)
+              n[count++] = v.normalized();
+    }
+    for (int d = 0; d < dim; ++d) {
+      n[count++] = Vec<dim>::Unit(d);
+      n[count++] = -Vec<dim>::Unit(d);
+    }
+    return n;
+  }();
+  return directions;
 }
 
 template <int dim> VoronoiCell<dim> ball_like_cell(double apothem) {
   VoronoiCell<dim> cell(apothem);
-  for (const Vec<dim> &n : directions_between_axes<dim>())
+  for (const Vec<dim> &n : directions_of_ball<dim>())
     cell.cut(n, apothem);
   return cell;
 }
@@ -86,40 +98,103 @@ template <int dim> class CellBuilder {
 public:
   CellBuilder(Points<dim> &points, Cloud<dim> &cloud)
       : points_(points), cloud_(cloud), free_(ball_like_cell<dim>(horizon * cloud.spacing)),
-        lone_apothem_(cloud.spacing * lone_ratio()) {
+        lone_apothem_(cloud.spacing * lone_ratio()) {}
+
+  /// Cells of the points first .. first + 7; returns how many of them were cut.
+  int update(int first) const {
+    const int count = std::min(pack_size, points_.size() - first);
+    unsigned unknown = (1u << count) - 1;
     if constexpr (dim == 2) {
-      for (int k = 0; k < 8; ++k)
-        directions_.emplace_back(std::cos(k * std::numbers::pi / 4),
-                                 std::sin(k * std::numbers::pi / 4));
+      const PackedStencil<2> s(first, points_, cloud_);
+      const unsigned enclosed = far_from_walls(s);
+      unknown &= ~take_known(s, enclosed);
+      unsigned found = 0;
+      for (unsigned rest = unknown; rest != 0; rest &= rest - 1)
+        if (const int l = std::countr_zero(rest); cut(first + l) && (enclosed >> l & 1) != 0)
+          found |= 1u << l;
+      if (found != 0)
+        take_known(s, found);
     } else {
-      directions_ = directions_between_axes<3>();
-      for (int d = 0; d < 3; ++d)
-        directions_.insert(directions_.end(), {Vec<3>::Unit(d), -Vec<3>::Unit(d)});
+      for (int i = first; i < first + count; ++i)
+        cut(i);
     }
+    return std::popcount(unknown);
   }
 
-  void update(int i) const {
-    const VoronoiCell<dim> cell = cell_of(i);
+private:
+  double limit_of(int i) const {
     const bool was_open = points_.at_surface[i] == SurfaceMemory::open;
-    const double limit = cloud_.has_air ? (was_open ? close_ratio : open_ratio) * cloud_.spacing
-                                        : std::numeric_limits<double>::infinity();
+    return cloud_.has_air ? (was_open ? close_ratio : open_ratio) * cloud_.spacing
+                          : std::numeric_limits<double>::infinity();
+  }
+
+  void set_closed(int i, double volume, const Vec<dim> &centroid) const {
     cloud_.surface_normal[i] = Vec<dim>::Zero();
     cloud_.kind[i] = PointKind::interior;
-    const bool is_open = cell.reach() > limit;
+    cloud_.centroid_offset[i] = centroid;
+    cloud_.cell_volume[i] = volume;
+  }
+
+  /// Cuts one cell; true when it is closed and its neighbours are remembered.
+  bool cut(int i) const {
+    const VoronoiCell<dim> cell = cell_of(i);
     const Vec<dim> offset = cell.centroid();
-    cloud_.centroid_offset[i] = offset;
-    if (!is_open) {
-      cloud_.cell_volume[i] = cell.volume();
-      return;
+    if (cell.reach() <= limit_of(i)) {
+      set_closed(i, cell.volume(), offset);
+      return remember(i, cell);
     }
     points_.at_surface[i] = SurfaceMemory::open;
+    cloud_.centroid_offset[i] = offset;
     const bool is_thin = offset.norm() < thin_ratio * cloud_.spacing;
     cloud_.kind[i] = is_thin ? PointKind::thin : PointKind::surface;
     cloud_.surface_normal[i] = is_thin ? Vec<dim>(Vec<dim>::Zero()) : Vec<dim>(offset.normalized());
     cloud_.cell_volume[i] = enveloped_volume(cell, cloud_.surface_normal[i], cloud_.kind[i]);
+    return false;
   }
 
-private:
+  // --- cells that are known -----------------------------------------------------------------
+
+  unsigned far_from_walls(const PackedStencil<dim> &s) const {
+    unsigned lanes = 0;
+    for (int l = 0; l < s.count(); ++l) {
+      const PointWalls<dim> *walls = cloud_.walls_of(s.first() + l);
+      lanes |= static_cast<unsigned>(!walls || walls->count == 0) << l;
+    }
+    return lanes;
+  }
+
+  /// Sets those of the cells in `lanes` that the memory knows and that are closed; returns them.
+  unsigned take_known(const PackedStencil<2> &s, unsigned lanes) const {
+    const PackedCells cells = known_cells(s, points_, cloud_, cloud_.cell_memory);
+    lanes &= bits_of(cells.is_known);
+    for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
+      const int l = std::countr_zero(rest), i = s.first() + l;
+      if (std::sqrt(cells.reach2[l]) <= limit_of(i))
+        set_closed(i, cells.volume[l], {cells.centroid[0][l], cells.centroid[1][l]});
+      else
+        lanes &= ~(1u << l);
+    }
+    return lanes;
+  }
+
+  bool remember(int, const VoronoiCell<3> &) const { return false; }
+  bool remember(int i, const VoronoiCell<2> &cell) const {
+    CellGenerators known;
+    for (int k = 0; k < cell.size(); ++k) {
+      const Vec<2> &a = cell.corner(k), &b = cell.corner(k + 1 == cell.size() ? 0 : k + 1);
+      if ((b - a).norm() <= shortest_edge * cloud_.spacing)
+        continue;
+      if (cell.edge_of(k) == VoronoiCell<2>::nobody || known.count == CellGenerators::most)
+        return false;
+      known.id[known.count++] = points_.id[cell.edge_of(k)];
+    }
+    // Sums over the corners begin at the same one, whenever the cell was cut.
+    const auto begin = known.id.begin(), end = begin + known.count;
+    std::rotate(begin, std::min_element(begin, end), end);
+    cloud_.cell_memory.generators[points_.id[i]] = known;
+    return known.count >= 3;
+  }
+
   VoronoiCell<dim> cell_of(int i) const {
     VoronoiCell<dim> cell = free_;
     const Vec<dim> &x = points_.position[i];
@@ -127,20 +202,20 @@ private:
     const auto neighbours = cloud_.neighbours.of(i);
     for (const int j : neighbours)
       if (const Vec<dim> r = points_.position[j] - x; r.squaredNorm() < near2)
-        cut_towards(cell, r);
+        cut_towards(cell, r, j);
     if (const PointWalls<dim> *walls = cloud_.walls_of(i))
       for (const Projection<dim> &p : *walls)
         cell.cut(p.normal, std::max(p.distance, 1e-3 * cloud_.spacing));
     for (const int j : neighbours)
       if (const Vec<dim> r = points_.position[j] - x; r.squaredNorm() >= near2)
-        cut_towards(cell, r);
+        cut_towards(cell, r, j);
     return cell;
   }
 
   // The part of an open cell that counts as fluid: up to half a spacing outside the point.
   double enveloped_volume(VoronoiCell<dim> cell, const Vec<dim> &normal, PointKind kind) const {
     const double limit = kind == PointKind::thin ? lone_apothem_ : cloud_.spacing;
-    for (const Vec<dim> &n : directions_)
+    for (const Vec<dim> &n : directions_of_ball<dim>())
       cell.cut(n, limit);
     if (kind == PointKind::surface)
       cell.cut(normal, 0.5 * cloud_.spacing);
@@ -159,7 +234,6 @@ private:
   Cloud<dim> &cloud_;
   VoronoiCell<dim> free_; // of a point with nothing near
   double lone_apothem_;   // [m]
-  std::vector<Vec<dim>> directions_;
 };
 
 } // namespace
@@ -169,7 +243,7 @@ void update_walls(Points<dim> &points, const Walls<dim> &walls, double spacing, 
   cloud.spacing = spacing;
   cloud.radius = kernel_radius_ratio * spacing;
   cloud.grid = grid_over(points, cloud.radius);
-  sort_by_cell(points, cloud.grid, cloud.ranges);
+  sort_by_cell(points, cloud.grid, cloud.ranges, cloud.sort_memory);
   find_walls(points, walls, cloud);
 }
 
@@ -177,6 +251,7 @@ template <int dim>
 void update_neighbours(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &cloud) {
   find_neighbours(points, cloud.grid, cloud.ranges, cloud.radius, cloud.neighbours);
   drop_hidden_neighbours(points, walls, cloud);
+  slice_lists(cloud.neighbours, cloud.slices);
 }
 
 template <int dim> void update_cells(Points<dim> &points, Cloud<dim> &cloud) {
@@ -185,8 +260,21 @@ template <int dim> void update_cells(Points<dim> &points, Cloud<dim> &cloud) {
   cloud.surface_normal.resize(n);
   cloud.cell_volume.resize(n);
   cloud.centroid_offset.resize(n);
+  if constexpr (dim == 2) {
+    if (!cloud.remembers_cells)
+      cloud.cell_memory.generators.clear();
+    number_points(points, cloud.cell_memory);
+  }
   const CellBuilder<dim> cells(points, cloud);
-  for_each_index(n, [&](int i) { cells.update(i); });
+  cloud.cells_cut = static_cast<int>(block_sums<1>(
+      n,
+      [&](IndexRange range) {
+        int cut = 0;
+        for (int first = range.begin; first < range.end; first += pack_size)
+          cut += cells.update(first);
+        return std::array<double, 1>{static_cast<double>(cut)};
+      },
+      Work::heavy)[0]);
 }
 
 template void update_walls(Points<2> &, const Walls<2> &, double, Cloud<2> &);

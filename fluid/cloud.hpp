@@ -13,10 +13,23 @@
 
 namespace sluice::fluid {
 
-enum class PointKind : std::uint8_t {
+enum class PointKind : std::int32_t { // wide enough to be gathered
   interior, // pressure from the Poisson equation
   surface,  // at the free surface: pressure falls to zero half a spacing outside
   thin,     // open on both sides, or nearly alone: pressure is zero
+};
+
+/// The points that cut one cell, counter-clockwise; none: not known.
+struct CellGenerators {
+  static constexpr int most = 11;
+  int count = 0;
+  std::array<std::int32_t, most> id;
+};
+
+/// What is remembered of cells, by the id of their point.
+struct CellMemory {
+  std::vector<CellGenerators> generators;
+  std::vector<int> index_of_id; // in the present order of the points, -1: gone
 };
 
 template <int dim> struct Cloud {
@@ -26,6 +39,7 @@ template <int dim> struct Cloud {
   Grid<dim> grid;
   CellRanges ranges;
   NeighbourLists neighbours; // those in sight
+  SlicedPattern slices;      // the same lists side by side
   FaceGrid near_faces;
   std::vector<int> wall_slot;               // per point: index into point_walls, or -1
   std::vector<int> wall_points;             // per slot: the point
@@ -34,6 +48,11 @@ template <int dim> struct Cloud {
   std::vector<Vec<dim>> surface_normal;  // unit, out of the fluid; zero for interior points
   std::vector<double> cell_volume;       // [m^dim]; that of the surface envelope at open cells
   std::vector<Vec<dim>> centroid_offset; // cell centroid minus position [m]
+
+  SortMemory<dim> sort_memory;
+  CellMemory cell_memory;      // of the last step's cells, in the plane
+  bool remembers_cells = true; // false: every cell is cut anew, with the same result
+  int cells_cut = 0;           // in the last update; the others were known
 
   const PointWalls<dim> *walls_of(int i) const {
     return wall_slot[i] < 0 ? nullptr : &point_walls[wall_slot[i]];

@@ -43,16 +43,29 @@ template <int dim> Integrals<dim> integrate(const FluidSolver<dim> &solver) {
   const Points<dim> &points = solver.state.points;
   const Cloud<dim> &cloud = solver.cloud();
   const CentreLine line(solver.walls);
-  Integrals<dim> total = integrate(solver.state, solver.params());
-  for (int i = 0; i < points.size(); ++i) {
-    total.volume += cloud.cell_volume[i];
-    if (!line.exists() || !line.is_past(points.position[i])) {
-      total.tank_volume += cloud.cell_volume[i];
-      total.tank_point_volume += volume_of_point<dim>(cloud.spacing);
+  const int n = points.size();
+  std::array<double, Blocks::max_count> lowest{}, highest{};
+  const auto sums = block_sums<3>(n, [&](IndexRange range) {
+    std::array<double, 3> part{};
+    double low = 0, high = 0;
+    for (int i = range.begin; i < range.end; ++i) {
+      const bool is_in_tank = !line.exists() || !line.is_past(points.position[i]);
+      part[0] += cloud.cell_volume[i];
+      part[1] += is_in_tank ? cloud.cell_volume[i] : 0.0;
+      part[2] += is_in_tank;
+      low = std::min(low, points.pressure[i]);
+      high = std::max(high, points.pressure[i]);
     }
-    total.min_pressure = std::min(total.min_pressure, points.pressure[i]);
-    total.max_pressure = std::max(total.max_pressure, points.pressure[i]);
-  }
+    lowest[Blocks(n).of(range.begin)] = low;
+    highest[Blocks(n).of(range.begin)] = high;
+    return part;
+  });
+  Integrals<dim> total = integrate(solver.state, solver.params());
+  total.volume = sums[0];
+  total.tank_volume = sums[1];
+  total.tank_point_volume = sums[2] * volume_of_point<dim>(cloud.spacing);
+  total.min_pressure = *std::min_element(lowest.begin(), lowest.end());
+  total.max_pressure = *std::max_element(highest.begin(), highest.end());
   return total;
 }
 

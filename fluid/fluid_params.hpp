@@ -59,6 +59,7 @@ template <int dim> struct FluidParams {
   double row_guard = 0.1;
   double gradient_guard = 20;
   double noise_damping = 0.5;
+  bool remember_cells = true;
   MotionParams motion;
   Rheology rheology; // from table [fluid.rheology] and `viscosity`
 
@@ -135,6 +136,8 @@ template <int dim> struct FluidParams {
     read("noise_damping", noise_damping,
          "decay of velocity modes at the scale of the points, in units of the pace")
         .at_least(0);
+    read("remember_cells", remember_cells,
+         "false: all Voronoi cells are cut anew in every step, with the same result");
     read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
         .at_least(0);
     read("agitation", motion.agitation, "disturbance of the points per unit of strain, in spacings")

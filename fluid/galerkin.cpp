@@ -93,6 +93,12 @@ private:
   using typename Base::CoarseWindow, typename Base::Window;
   static constexpr int parts = size / lanes;
 
+  // Memory is shared by levels of all sizes and never shrinks: growing again would clear it.
+  template <class T> static void make_room(std::vector<T> &values, std::size_t n) {
+    if (values.size() < n)
+      values.resize(n);
+  }
+
   float *p(int i) { return &m_.p_[(static_cast<std::size_t>(i) + 1) * size]; }
   float *a_p(int i) { return &m_.a_p_[static_cast<std::size_t>(i) * size]; }
   float *weight(int m) { return &transfer_.weight[static_cast<std::size_t>(m) * width]; }
@@ -126,14 +132,13 @@ private:
   }
 
   void compute_p() {
-    const int n_slices = matrix_.pattern.slices();
-    m_.shift_.resize(matrix_.pattern.stored());
+    make_room(m_.shift_, matrix_.pattern.stored());
     transfer_.weight.resize(aggregates_.member.size() * width);
-    m_.p_.resize((static_cast<std::size_t>(matrix_.rows()) + 1) * size);
+    make_room(m_.p_, (static_cast<std::size_t>(matrix_.rows()) + 1) * size);
     std::fill_n(m_.p_.begin(), size, 0.0f);
-    for_each_block(n_slices, [&](IndexRange range, int) {
-      for (int s = range.begin; s < range.end; ++s)
-        compute_p_of_slice(s);
+    for_each_block(matrix_.rows(), [&](IndexRange range, int) {
+      for (int first = range.begin; first < range.end; first += lanes)
+        compute_p_of_slice(first / lanes);
     });
   }
 
@@ -177,7 +182,7 @@ private:
   }
 
   void compute_a_p() {
-    m_.a_p_.resize(static_cast<std::size_t>(matrix_.rows()) * size);
+    make_room(m_.a_p_, static_cast<std::size_t>(matrix_.rows()) * size);
     for_each_index(matrix_.rows(), [&](int i) {
       if (aggregates_.of_row[i] >= 0)
         compute_a_p(i);

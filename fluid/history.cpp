@@ -109,6 +109,8 @@ void History<dim>::update_extremes(const FluidSolver<dim> &solver, const Integra
   guarded_rows_ += solver.report().rows.linear + solver.report().rows.plain;
   pressure_iterations_ += solver.report().pressure_iterations;
   pressure_solves_ += solver.report().pressure_solves;
+  cells_ += solver.state.points.size();
+  cells_cut_ += solver.report().cells_cut;
   viscous_passes_ += solver.report().viscous_passes;
   viscous_iterations_ += solver.report().viscous_iterations;
   ++steps_;
@@ -213,6 +215,8 @@ void History<dim>::write_summary(const FluidSolver<dim> &solver, const std::stri
   summary["guarded_rows_per_step"] = static_cast<double>(guarded_rows_) / n;
   summary["pressure_iterations_per_solve"] =
       static_cast<double>(pressure_iterations_) / std::max(1L, pressure_solves_);
+  summary["cells_known_share"] =
+      1 - static_cast<double>(cells_cut_) / static_cast<double>(std::max(1L, cells_));
   summary["viscous_passes_per_step"] = static_cast<double>(viscous_passes_) / n;
   summary["viscous_iterations_per_step"] = static_cast<double>(viscous_iterations_) / n;
   const ViscousRowCounts &rows = solver.report().viscous_rows;

@@ -54,6 +54,7 @@ private:
   double work_on_walls_ = 0, outlet_energy_ = 0, start_outlet_energy_ = 0, last_time_ = 0;
   Integrals<dim> start_, last_;
   long viscous_passes_ = 0, viscous_iterations_ = 0;
+  long cells_ = 0, cells_cut_ = 0;
   long guarded_rows_ = 0, steps_ = 0, pressure_iterations_ = 0, pressure_solves_ = 0;
   double energy_scale_ = 0; // [J], kinetic and potential above the lowest point at the start
   double volume_drift_max_ = 0, energy_gain_max_ = -1e300;

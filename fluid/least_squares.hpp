@@ -12,13 +12,14 @@
 // here.
 #pragma once
 
-#include "bridge/base/vec.hpp"
+#include "fluid/packs.hpp"
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <type_traits>
 #include <utility>
 
 namespace sluice::fluid {
@@ -44,10 +45,26 @@ inline Products<3> products(const Vec<3> &q) {
   return p;
 }
 
+inline std::array<Pack, 3> products(const PackVec<2> &q) {
+  return {q[0] * q[0], q[0] * q[1], q[1] * q[1]};
+}
+inline std::array<Pack, 6> products(const PackVec<3> &q) {
+  return {q[0] * q[0], q[0] * q[1], q[0] * q[2], q[1] * q[1], q[1] * q[2], q[2] * q[2]};
+}
+
 /// Quadratic basis at q = r / h.
 template <int dim> Basis<dim> quadratic_basis(const Vec<dim> &q) {
   Basis<dim> basis;
   basis << q, products(q);
+  return basis;
+}
+
+template <std::size_t dim>
+std::array<Pack, n_terms<static_cast<int>(dim)>> quadratic_basis(const std::array<Pack, dim> &q) {
+  std::array<Pack, n_terms<static_cast<int>(dim)>> basis;
+  const auto of_degree_two = products(q);
+  std::copy(q.begin(), q.end(), basis.begin());
+  std::copy(of_degree_two.begin(), of_degree_two.end(), basis.begin() + dim);
   return basis;
 }
 
@@ -76,15 +93,17 @@ template <int dim> Basis<dim> laplacian_functional(double h) {
 
 /// The distinct entries of P P^T: monomials of degree two to four, 12 in the plane and 31 in space,
 /// each written as one product of two coordinates times another, or times one coordinate.
-template <int dim> class Monomials {
+/// `Number` is a double, or a Pack for the monomials of eight points.
+template <int dim, class Number = double> class Monomials {
 public:
+  using Place = std::conditional_t<std::is_same_v<Number, double>, Vec<dim>, PackVec<dim>>;
   static constexpr int cubics = dim == 2 ? 4 : 10, quartics = dim == 2 ? 5 : 15;
   static constexpr int count = n_products<dim> + cubics + quartics;
 
   /// Adds w times every monomial at q to `sum`.
-  static void add(const Vec<dim> &q, double w, std::array<double, count> &sum) {
-    const Products<dim> at_q = products(q);
-    std::array<double, n_products<dim>> p, weighted; // numbers of their own: registers, no memory
+  static void add(const Place &q, const Number &w, std::array<Number, count> &sum) {
+    const auto at_q = products(q);
+    std::array<Number, n_products<dim>> p, weighted; // numbers of their own: registers, no memory
     for (int k = 0; k < n_products<dim>; ++k) {
       p[k] = at_q[k];
       weighted[k] = w * p[k];
@@ -185,21 +204,21 @@ private:
   }
 
   template <std::size_t... k>
-  static void add_products(const std::array<double, n_products<dim>> &weighted,
-                           std::array<double, count> &sum, std::index_sequence<k...>) {
+  static void add_products(const std::array<Number, n_products<dim>> &weighted,
+                           std::array<Number, count> &sum, std::index_sequence<k...>) {
     ((sum[k] += weighted[k]), ...);
   }
   template <std::size_t... k>
-  static void add_cubics(const Vec<dim> &q, const std::array<double, n_products<dim>> &weighted,
-                         std::array<double, count> &sum, std::index_sequence<k...>) {
+  static void add_cubics(const Place &q, const std::array<Number, n_products<dim>> &weighted,
+                         std::array<Number, count> &sum, std::index_sequence<k...>) {
     ((sum[n_products<dim> + k] +=
       weighted[constant<factors(3, k).weighted>] * q[constant<factors(3, k).other>]),
      ...);
   }
   template <std::size_t... k>
-  static void add_quartics(const std::array<double, n_products<dim>> &p,
-                           const std::array<double, n_products<dim>> &weighted,
-                           std::array<double, count> &sum, std::index_sequence<k...>) {
+  static void add_quartics(const std::array<Number, n_products<dim>> &p,
+                           const std::array<Number, n_products<dim>> &weighted,
+                           std::array<Number, count> &sum, std::index_sequence<k...>) {
     ((sum[n_products<dim> + cubics + k] +=
       weighted[constant<factors(4, k).weighted>] * p[constant<factors(4, k).other>]),
      ...);
@@ -207,59 +226,111 @@ private:
   template <int value> static constexpr int constant = value;
 };
 
-/// Moment matrix of the quadratic fit. Neighbours enter through the sums of monomials alone, since
-/// P P^T holds no others.
-template <int dim> class QuadraticFit {
+/// Cholesky factors of a small matrix, or of those of eight points. The diagonal is kept inverted.
+template <int n, class Number> class Cholesky {
 public:
-  /// Value row of a neighbour at q.
-  void add_neighbour(const Vec<dim> &q, double w) { Monomials<dim>::add(q, w, sum_); }
-  /// Any other row.
-  void add_row(const Basis<dim> &row, double w) { rows_.noalias() += (w * row) * row.transpose(); }
-  /// Cholesky factorisation; false when the moment matrix is not positive definite.
-  bool factorise() {
-    fill_lower(std::make_index_sequence<n * n>());
-    lower_ += rows_;
+  using Vector = std::array<Number, n>;
+
+  /// By row and column, the lower triangle alone.
+  std::array<Vector, n> lower{};
+
+  /// Factorises in place; false, per point, when the matrix is not positive definite.
+  auto factorise() {
+    auto is_definite = Number{} == Number{};
     for (int k = 0; k < n; ++k) {
       for (int m = 0; m < k; ++m)
-        lower_(k, k) -= lower_(k, m) * lower_(k, m);
-      if (!(lower_(k, k) > 0))
-        return false;
-      lower_(k, k) = 1 / std::sqrt(lower_(k, k)); // the diagonal is kept inverted
+        lower[k][k] -= lower[k][m] * lower[k][m];
+      is_definite = is_definite & (lower[k][k] > 0);
+      lower[k][k] = 1.0 / square_root(lower[k][k]);
       for (int r = k + 1; r < n; ++r) {
         for (int m = 0; m < k; ++m)
-          lower_(r, k) -= lower_(r, m) * lower_(k, m);
-        lower_(r, k) *= lower_(k, k);
+          lower[r][k] -= lower[r][m] * lower[k][m];
+        lower[r][k] *= lower[k][k];
       }
     }
-    return true;
+    return is_definite;
   }
-  /// A^-1 functional.
-  Basis<dim> solve(Basis<dim> x) const {
+  template <class V> void solve(V &x) const {
     for (int k = 0; k < n; ++k) {
       for (int m = 0; m < k; ++m)
-        x[k] -= lower_(k, m) * x[m];
-      x[k] *= lower_(k, k);
+        x[k] -= lower[k][m] * x[m];
+      x[k] *= lower[k][k];
     }
     for (int k = n - 1; k >= 0; --k) {
       for (int m = k + 1; m < n; ++m)
-        x[k] -= lower_(m, k) * x[m];
-      x[k] *= lower_(k, k);
+        x[k] -= lower[m][k] * x[m];
+      x[k] *= lower[k][k];
     }
-    return x;
+  }
+};
+
+/// Moment matrix of the quadratic fit. Neighbours enter through the sums of monomials alone, since
+/// P P^T holds no others.
+template <int dim, class Number = double> class MomentFit {
+public:
+  /// Value row of a neighbour at q.
+  void add_neighbour(const typename Monomials<dim, Number>::Place &q, const Number &w) {
+    Monomials<dim, Number>::add(q, w, sum_);
   }
 
-private:
+protected:
   static constexpr int n = n_terms<dim>;
 
+  void fill_lower() { fill_lower(std::make_index_sequence<n * n>()); }
+
+  Cholesky<n, Number> cholesky_;
+
+private:
   template <std::size_t... k> void fill_lower(std::index_sequence<k...>) {
-    ((lower_(k % n, k / n) = k % n < k / n ? 0 : sum_[number<Monomials<dim>::of(k % n, k / n)>]),
+    ((cholesky_.lower[k % n][k / n] =
+          k % n < k / n ? Number{} : sum_[number<Monomials<dim>::of(k % n, k / n)>]),
      ...);
   }
   template <int value> static constexpr int number = value;
 
-  std::array<double, Monomials<dim>::count> sum_{};
-  Eigen::Matrix<double, n, n> rows_ = Eigen::Matrix<double, n, n>::Zero();
-  Eigen::Matrix<double, n, n> lower_;
+  std::array<Number, Monomials<dim>::count> sum_{};
+};
+
+/// The fit of one point, whose rows may be other than values too.
+template <int dim> class QuadraticFit : public MomentFit<dim> {
+public:
+  void add_row(const Basis<dim> &row, double w) { rows_.noalias() += (w * row) * row.transpose(); }
+  /// Cholesky factorisation; false when the moment matrix is not positive definite.
+  bool factorise() {
+    this->fill_lower();
+    for (int c = 0; c < this->n; ++c)
+      for (int r = c; r < this->n; ++r)
+        this->cholesky_.lower[r][c] += rows_(r, c);
+    return this->cholesky_.factorise();
+  }
+  /// A^-1 functional.
+  Basis<dim> solve(Basis<dim> x) const {
+    this->cholesky_.solve(x);
+    return x;
+  }
+
+private:
+  Eigen::Matrix<double, n_terms<dim>, n_terms<dim>> rows_ =
+      Eigen::Matrix<double, n_terms<dim>, n_terms<dim>>::Zero();
+};
+
+/// The fits of eight points that no wall adds to.
+template <int dim> class PackedFit : public MomentFit<dim, Pack> {
+public:
+  using Functional = std::array<Pack, n_terms<dim>>;
+
+  PackMask factorise() {
+    this->fill_lower();
+    return this->cholesky_.factorise();
+  }
+  /// A^-1 functional, the same for all points.
+  Functional solve(const Basis<dim> &functional) const {
+    Functional x;
+    for (int k = 0; k < this->n; ++k)
+      x[k] = Pack{} + functional[k];
+    this->cholesky_.solve(x);
+    return x;
+  }
 };
 
 /// Second moment of the linear fit, in scaled coordinates q.

@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/motion.hpp"
 
-#include "fluid/parallel.hpp"
-#include "fluid/weights.hpp"
+#include "fluid/packed_stencil.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -114,21 +113,23 @@ void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cl
   const double volume = volume_of_point<dim>(cloud.spacing);
   const double rate = params.volume_rate * pace;
   constexpr double largest_error = 0.3;
-  for_each_point(points.size(), [&](int i) {
-    divergence[i] = 0;
-    if (cloud.kind[i] != PointKind::interior)
-      return;
-    double filled = cloud.cell_volume[i], total = 1;
-    for (const int j : cloud.neighbours.of(i)) {
-      if (cloud.kind[j] != PointKind::interior)
-        continue;
-      const double q = (points.position[j] - points.position[i]).norm() / cloud.radius;
-      const double w = weight(std::min(q, 1.0));
-      filled += w * cloud.cell_volume[j];
+  for_each_pack(points.size(), [&](int first) {
+    const PackedStencil<dim> s(first, points, cloud);
+    Pack filled = gathered(s.self(), cloud.cell_volume.data()), total = Pack{} + 1;
+    for (int k = 0; k < s.width(); ++k) {
+      const int *j = s.neighbours(k);
+      const PackMask counts =
+          s.has_neighbour(k) & gathered_equal(j, cloud.kind.data(), PointKind::interior);
+      const Pack w = counts ? s.weight_at(s.offset(k)) : Pack{};
+      filled += w * gathered(j, cloud.cell_volume.data());
       total += w;
     }
-    const double error = 1 - filled / (total * volume);
-    divergence[i] = rate * std::clamp(error, -largest_error, largest_error);
+    for (int l = 0; l < s.count(); ++l) {
+      const bool is_interior = cloud.kind[first + l] == PointKind::interior;
+      const double error = 1 - filled[l] / (total[l] * volume);
+      divergence[first + l] =
+          is_interior ? rate * std::clamp(error, -largest_error, largest_error) : 0.0;
+    }
   });
 }
 
@@ -144,6 +145,18 @@ Vec<dim> push_apart(int i, const Points<dim> &points, const Cloud<dim> &cloud, d
       push += 0.5 * (closest / distance - 1) * r;
   }
   return push;
+}
+
+// Which of the points first .. first + 7 may have a neighbour closer than `closest`.
+template <int dim>
+unsigned crowded_points(int first, const Points<dim> &points, const Cloud<dim> &cloud,
+                        double closest) {
+  const PackedStencil<dim> s(first, points, cloud);
+  const double limit = 1.0001 * closest / cloud.radius;
+  PackMask crowded{};
+  for (int k = 0; k < s.width(); ++k)
+    crowded |= (s.squared_norm(s.offset(k)) < limit * limit) & s.has_neighbour(k);
+  return bits_of(crowded);
 }
 
 // Numbers in [-1, 1] that depend on the point alone (SplitMix64 by S. Vigna), two from each draw.
@@ -170,7 +183,7 @@ void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams
                 MatView<dim> velocity_gradient, double dt) {
   const double closest = params.closest_pair * cloud.spacing;
   const double longest = 0.1 * cloud.spacing;
-  for_each_point(points.size(), [&](int i) {
+  const auto shift_of = [&](int i, bool is_crowded) {
     const Mat<dim> &g = velocity_gradient[i];
     const double strain_rate = (g + g.transpose()).norm() / std::sqrt(2.0);
     const double strain = std::min(strain_rate * dt, 0.25);
@@ -180,13 +193,19 @@ void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams
     shift -= n.dot(shift) * n;
     if (cloud.kind[i] == PointKind::thin)
       shift.setZero();
-    shift += push_apart(i, points, cloud, closest);
+    if (is_crowded)
+      shift += push_apart(i, points, cloud, closest);
     const double length = shift.norm();
-    if (length > longest)
-      shift *= longest / length;
-    points.shift[i] = shift;
-    points.shift_velocity[i] =
-        cloud.kind[i] == PointKind::interior ? Vec<dim>(g * shift) : Vec<dim>(Vec<dim>::Zero());
+    return length > longest ? Vec<dim>(longest / length * shift) : shift;
+  };
+  for_each_pack(points.size(), [&](int first) {
+    const unsigned crowded = crowded_points(first, points, cloud, closest);
+    for (int i = first; i < std::min(first + pack_size, points.size()); ++i) {
+      points.shift[i] = shift_of(i, (crowded >> (i - first) & 1) != 0);
+      points.shift_velocity[i] = cloud.kind[i] == PointKind::interior
+                                     ? Vec<dim>(velocity_gradient[i] * points.shift[i])
+                                     : Vec<dim>(Vec<dim>::Zero());
+    }
   });
 }
 

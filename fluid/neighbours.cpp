@@ -3,6 +3,7 @@
 
 #include "bridge/base/check.hpp"
 #include "fluid/coordinates.hpp"
+#include "fluid/packs.hpp"
 #include "fluid/parallel.hpp"
 
 #include <algorithm>
@@ -57,28 +58,20 @@ template <int dim> Grid<dim> grid_over(const Points<dim> &points, double cell_si
   return grid;
 }
 
-namespace {
-
-template <class T> void reorder(std::vector<T> &values, const std::vector<int> &order) {
-  std::vector<T> sorted(values.size());
-  for_each_index(static_cast<int>(order.size()), [&](int k) { sorted[k] = values[order[k]]; });
-  values.swap(sorted);
-}
-
-} // namespace
-
 template <int dim>
-void sort_by_cell(Points<dim> &points, const Grid<dim> &grid, CellRanges &ranges) {
+void sort_by_cell(Points<dim> &points, const Grid<dim> &grid, CellRanges &ranges,
+                  SortMemory<dim> &memory) {
   const int n = points.size();
-  std::vector<int> cell(n), order(n);
+  auto &[cell, order, next, sorted] = memory;
+  cell.resize(n);
+  order.resize(n);
+  for_each_point(n, [&](int i) { cell[i] = grid.cell(points.position[i]); });
   ranges.start.assign(grid.n_cells() + 1, 0);
-  for (int i = 0; i < n; ++i) {
-    cell[i] = grid.cell(points.position[i]);
+  for (int i = 0; i < n; ++i)
     ++ranges.start[cell[i] + 1];
-  }
   for (int c = 0; c < grid.n_cells(); ++c)
     ranges.start[c + 1] += ranges.start[c];
-  std::vector<int> next(ranges.start.begin(), ranges.start.end() - 1);
+  next.assign(ranges.start.begin(), ranges.start.end() - 1);
   bool in_order = true;
   for (int i = 0; i < n; ++i) {
     const int k = next[cell[i]]++;
@@ -87,13 +80,17 @@ void sort_by_cell(Points<dim> &points, const Grid<dim> &grid, CellRanges &ranges
   }
   if (in_order)
     return;
-  for_each_array(points, [&](const char *, auto &values) { reorder(values, order); });
+  for_each_pair_of_arrays(points, sorted, [&](const char *, auto &values, auto &in_new_order) {
+    in_new_order.resize(n);
+    for_each_index(n, [&](int k) { in_new_order[k] = values[order[k]]; });
+    values.swap(in_new_order);
+  });
 }
 
 namespace {
 
-// Calls visit(j) for every point j in the 3^dim cells around x_i: a few ranges, since the cells of
-// a row are contiguous.
+// Calls visit(begin, end) for the ranges of points in the 3^dim cells around x_i: a few, since the
+// cells of a row are contiguous.
 template <int dim, class Visit>
 void for_each_near(const Vec<dim> &x, const Grid<dim> &grid, const CellRanges &ranges,
                    Visit &&visit) {
@@ -102,32 +99,80 @@ void for_each_near(const Vec<dim> &x, const Grid<dim> &grid, const CellRanges &r
     low[d] = std::max(low[d] - 1, 0);
     high[d] = std::min(high[d] + 1, grid.size[d] - 1);
   }
-  grid.for_each_run(low, high, [&](int first, int last) {
-    for (int j = ranges.start[first]; j < ranges.start[last + 1]; ++j)
-      visit(j);
-  });
+  grid.for_each_run(
+      low, high, [&](int first, int last) { visit(ranges.start[first], ranges.start[last + 1]); });
 }
+
+/// Fills the lists, eight candidates at a time.
+template <int dim> class ListFiller {
+public:
+  ListFiller(const Points<dim> &points, const Grid<dim> &grid, const CellRanges &ranges,
+             double radius, NeighbourLists &lists)
+      : points_(points), grid_(grid), ranges_(ranges), radius2_(radius * radius), lists_(lists),
+        stride_(points.size() + pack_size) {
+    lists.count.resize(points.size());
+    lists.index.resize(static_cast<std::size_t>(points.size()) * lists.capacity);
+    lists.coordinate.resize(dim * stride_);
+    for_each_index(
+        points.size(),
+        [&](int i) {
+          for (int d = 0; d < dim; ++d)
+            lists.coordinate[d * stride_ + i] = points.position[i][d];
+        },
+        Work::light);
+  }
+
+  /// Length that the list would have.
+  int fill(int i) const {
+    int *const list = lists_.first(i);
+    int count = 0;
+    for_each_near<dim>(points_.position[i], grid_, ranges_, [&](int begin, int end) {
+      for (int j = begin; j < end; j += pack_size) {
+        const unsigned near = near_lanes(i, j, end);
+        if (count + pack_size <= lists_.capacity)
+          count += append_lanes(near, j, list + count);
+        else
+          count = append_within_capacity(near, j, list, count);
+      }
+    });
+    return count;
+  }
+
+private:
+  // Which of the points j .. j + 7 before `end` are near, i itself excluded.
+  unsigned near_lanes(int i, int j, int end) const {
+    Pack distance2{};
+    for (int d = 0; d < dim; ++d) {
+      const Pack r = load(&lists_.coordinate[d * stride_ + j]) - points_.position[i][d];
+      distance2 += r * r;
+    }
+    unsigned near = bits_of(distance2 < radius2_) & ((1u << std::min(end - j, pack_size)) - 1);
+    if (i >= j && i < j + pack_size)
+      near &= ~(1u << (i - j));
+    return near;
+  }
+
+  int append_within_capacity(unsigned near, int j, int *list, int count) const {
+    for (; near != 0; near &= near - 1)
+      list[std::min(count++, lists_.capacity - 1)] = j + std::countr_zero(near);
+    return count;
+  }
+
+  const Points<dim> &points_;
+  const Grid<dim> &grid_;
+  const CellRanges &ranges_;
+  double radius2_;
+  NeighbourLists &lists_;
+  std::size_t stride_;
+};
 
 // Fills all lists; returns the length that the longest would have.
 template <int dim>
 int fill_lists(const Points<dim> &points, const Grid<dim> &grid, const CellRanges &ranges,
                double radius, NeighbourLists &lists) {
-  const int n = points.size();
-  const double radius2 = radius * radius;
-  lists.count.resize(n);
-  lists.index.resize(static_cast<std::size_t>(n) * lists.capacity);
-  for_each_point(n, [&](int i) {
-    const Vec<dim> x = points.position[i];
-    int *const list = lists.first(i);
-    int count = 0;
-    for_each_near<dim>(x, grid, ranges, [&](int j) {
-      const bool is_near = (points.position[j] - x).squaredNorm() < radius2 && j != i;
-      list[std::min(count, lists.capacity - 1)] = j;
-      count += is_near;
-    });
-    lists.count[i] = count;
-  });
-  return n > 0 ? *std::max_element(lists.count.begin(), lists.count.end()) : 0;
+  const ListFiller<dim> filler(points, grid, ranges, radius, lists);
+  for_each_point(points.size(), [&](int i) { lists.count[i] = filler.fill(i); });
+  return points.size() > 0 ? *std::max_element(lists.count.begin(), lists.count.end()) : 0;
 }
 
 } // namespace
@@ -145,6 +190,25 @@ void find_neighbours(const Points<dim> &points, const Grid<dim> &grid, const Cel
   if (longest >= lists.capacity)
     for (int &count : lists.count)
       count = std::min(count, lists.capacity - 1);
+}
+
+void slice_lists(const NeighbourLists &lists, SlicedPattern &slices) {
+  const int n = static_cast<int>(lists.count.size());
+  constexpr int lanes = SlicedPattern::lanes;
+  slices.lay_out(n, [&](int i) { return lists.count[i]; });
+  const auto fill_slice = [&](int s) {
+    int *column = slices.column.data() + slices.place(s * lanes, 0);
+    for (int lane = 0; lane < lanes; ++lane) {
+      const int i = std::min(s * lanes + lane, n - 1);
+      const int count = s * lanes + lane < n ? lists.count[i] : 0;
+      for (int k = 0; k < slices.width(s * lanes); ++k)
+        column[k * lanes + lane] = k < count ? lists.first(i)[k] : i;
+    }
+  };
+  for_each_block(n, [&](IndexRange range, int) {
+    for (int first = range.begin; first < range.end; first += lanes)
+      fill_slice(first / lanes);
+  });
 }
 
 void lay_out_rows(const NeighbourLists &lists, SparseMatrix &matrix) {
@@ -167,8 +231,8 @@ template struct Grid<2>;
 template struct Grid<3>;
 template Grid<2> grid_over(const Points<2> &, double);
 template Grid<3> grid_over(const Points<3> &, double);
-template void sort_by_cell(Points<2> &, const Grid<2> &, CellRanges &);
-template void sort_by_cell(Points<3> &, const Grid<3> &, CellRanges &);
+template void sort_by_cell(Points<2> &, const Grid<2> &, CellRanges &, SortMemory<2> &);
+template void sort_by_cell(Points<3> &, const Grid<3> &, CellRanges &, SortMemory<3> &);
 template void find_neighbours(const Points<2> &, const Grid<2> &, const CellRanges &, double,
                               NeighbourLists &);
 template void find_neighbours(const Points<3> &, const Grid<3> &, const CellRanges &, double,

@@ -48,6 +48,7 @@ struct NeighbourLists {
   int capacity = 32;      // entries per point
   std::vector<int> count; // length of each list
   std::vector<int> index; // capacity entries per point
+  std::vector<double> coordinate; // of the points, direction by direction, for the search
 
   std::span<const int> of(int i) const { return {first(i), static_cast<std::size_t>(count[i])}; }
   const int *first(int i) const { return index.data() + static_cast<std::size_t>(i) * capacity; }
@@ -62,14 +63,24 @@ template <int dim> inline constexpr int most_neighbours = dim == 2 ? 64 : 224;
 /// Throws UserError when a position is not finite or the points spread over too many cells.
 template <int dim> Grid<dim> grid_over(const Points<dim> &points, double cell_size);
 
+/// Memory of the sorting, kept from step to step.
+template <int dim> struct SortMemory {
+  std::vector<int> cell, order, next;
+  Points<dim> sorted;
+};
+
 /// Sorts the points by cell, row by row (stable), and returns the range of each cell.
 template <int dim>
-void sort_by_cell(Points<dim> &points, const Grid<dim> &grid, CellRanges &ranges);
+void sort_by_cell(Points<dim> &points, const Grid<dim> &grid, CellRanges &ranges,
+                  SortMemory<dim> &memory);
 
 /// All pairs closer than `radius`; the grid's cells must not be smaller than `radius`.
 template <int dim>
 void find_neighbours(const Points<dim> &points, const Grid<dim> &grid, const CellRanges &ranges,
                      double radius, NeighbourLists &lists);
+
+/// The lists side by side: entry k of list i is the column of row i, short lists filled up with i.
+void slice_lists(const NeighbourLists &lists, SlicedPattern &slices);
 
 /// Rows with the point itself first and its neighbours after it, in the order of the lists; room
 /// for the values, which are not set.

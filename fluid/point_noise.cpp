@@ -1,8 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/point_noise.hpp"
 
-#include "fluid/parallel.hpp"
-#include "fluid/weights.hpp"
+#include "fluid/packed_stencil.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -31,18 +30,27 @@ template <int dim>
 void damp_point_noise(const Points<dim> &points, const Cloud<dim> &cloud, VecView<dim> reference,
                       MatView<dim> gradient, double rate, double dt, VecSpan<dim> velocity) {
   const double factor = std::min(rate * dt, 0.5) / lattice_weight<dim>();
-  for_each_point(points.size(), [&](int i) {
-    if (cloud.kind[i] == PointKind::thin)
-      return;
-    Vec<dim> unexplained = Vec<dim>::Zero();
-    for (const int j : cloud.neighbours.of(i)) {
-      if (cloud.kind[j] == PointKind::thin)
-        continue;
-      const Vec<dim> r = points.position[j] - points.position[i];
-      const double w = weight(std::min(r.norm() / cloud.radius, 1.0));
-      unexplained += w * (reference[j] - reference[i] - 0.5 * (gradient[i] + gradient[j]) * r);
-    }
-    velocity[i] += factor * unexplained;
+  for_each_pack(points.size(), [&](int first) {
+    const PackedStencil<dim> s(first, points, cloud);
+    const PackVec<dim> own = gathered(s.self(), reference.data());
+    const auto own_gradient = gathered(s.self(), gradient.data());
+    PackVec<dim> unexplained{};
+    s.for_each_neighbour([&](const int *j, const PackVec<dim> &q, const Pack &weight_of_j) {
+      const PackMask is_thin = gathered_equal(j, cloud.kind.data(), PointKind::thin);
+      const Pack w = is_thin ? Pack{} : weight_of_j;
+      const PackVec<dim> other = gathered(j, reference.data());
+      const auto other_gradient = gathered(j, gradient.data());
+      for (int a = 0; a < dim; ++a) {
+        Pack explained{};
+        for (int b = 0; b < dim; ++b)
+          explained += (own_gradient[b * dim + a] + other_gradient[b * dim + a]) * q[b];
+        unexplained[a] += w * (other[a] - own[a] - 0.5 * cloud.radius * explained);
+      }
+    });
+    for (int l = 0; l < s.count(); ++l)
+      if (cloud.kind[first + l] != PointKind::thin)
+        for (int a = 0; a < dim; ++a)
+          velocity[first + l][a] += factor * unexplained[a][l];
   });
 }
 

@@ -30,18 +30,23 @@ template <int dim> struct Points {
   int size() const { return static_cast<int>(position.size()); }
 };
 
-/// Calls body(name, array) for every array of the points: the one list of them.
+/// Calls body(name, array of a, array of b) for every array of the points: the one list of them.
+template <class A, class B, class Body> void for_each_pair_of_arrays(A &a, B &b, Body &&body) {
+  body("position", a.position, b.position);
+  body("velocity", a.velocity, b.velocity);
+  body("previous_velocity", a.previous_velocity, b.previous_velocity);
+  body("shift", a.shift, b.shift);
+  body("shift_velocity", a.shift_velocity, b.shift_velocity);
+  body("pressure", a.pressure, b.pressure);
+  body("pressure_gradient", a.pressure_gradient, b.pressure_gradient);
+  body("surface_pressure", a.surface_pressure, b.surface_pressure);
+  body("id", a.id, b.id);
+  body("at_surface", a.at_surface, b.at_surface);
+}
+/// Calls body(name, array).
 template <class AnyPoints, class Body> void for_each_array(AnyPoints &points, Body &&body) {
-  body("position", points.position);
-  body("velocity", points.velocity);
-  body("previous_velocity", points.previous_velocity);
-  body("shift", points.shift);
-  body("shift_velocity", points.shift_velocity);
-  body("pressure", points.pressure);
-  body("pressure_gradient", points.pressure_gradient);
-  body("surface_pressure", points.surface_pressure);
-  body("id", points.id);
-  body("at_surface", points.at_surface);
+  for_each_pair_of_arrays(points, points,
+                          [&](const char *name, auto &array, auto &) { body(name, array); });
 }
 
 /// Volume that a point stands for [m^3; in the plane m^2, per metre of depth].

@@ -13,6 +13,9 @@
 #include "fluid/least_squares.hpp"
 #include "fluid/sparse_matrix.hpp"
 
+#include <array>
+#include <cstdint>
+#include <span>
 #include <vector>
 
 namespace sluice::fluid {
@@ -36,17 +39,33 @@ enum class RowKind : std::uint8_t {
 /// Rows of each kind, for the run report.
 struct RowCounts {
   int quadratic = 0, linear = 0, plain = 0, open = 0;
+
+  int &of(RowKind kind) {
+    switch (kind) {
+    case RowKind::quadratic:
+      return quadratic;
+    case RowKind::linear:
+      return linear;
+    case RowKind::plain:
+      return plain;
+    default:
+      return open;
+    }
+  }
 };
 
 /// The discrete pressure problem of one step.
 template <int dim> struct PressureProblem {
-  SparseMatrix matrix;                    // rows scaled by spacing^2: entries of order one
+  SlicedMatrix matrix;                    // rows scaled by spacing^2: entries of order one
   std::vector<double> fluid_source;       // right-hand side without the wall velocity
   std::vector<double> source;             // right-hand side with it
   std::vector<Functionals<dim>> gradient; // of the derivatives per point
   std::vector<RowKind> row_kind;
   std::vector<std::array<WallRow<dim>, most_projections<dim>>> wall_rows; // per wall slot
   std::vector<Mat<dim>> velocity_gradient; // of u* [1/s], row: component
+  std::vector<std::int32_t> is_air;        // memory of release_tension, as the next two
+  std::vector<char> is_released;
+  std::vector<int> released;
   RowCounts rows;
   bool has_open_point = false; // else pressure is known up to a constant
 };
@@ -89,13 +108,18 @@ void set_wall_velocity(const Walls<dim> &walls, const Cloud<dim> &cloud,
 template <int dim>
 Vec<dim> pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
                            const PressureProblem<dim> &problem, std::span<const double> pressure);
-
-/// The same of the pressure that the points carry from the last step, with the operators of this
-/// one; the data at walls are those of the last gradient. What a step takes off a velocity by this
-/// gradient and gives back by the next differs by the change of the pressure alone, not by that of
-/// the operators.
+/// The same at every point.
 template <int dim>
-Vec<dim> carried_pressure_gradient(int i, const Points<dim> &points, const Cloud<dim> &cloud,
-                                   const PressureProblem<dim> &problem);
+void pressure_gradients(const Points<dim> &points, const Cloud<dim> &cloud,
+                        const PressureProblem<dim> &problem, std::span<const double> pressure,
+                        VecSpan<dim> gradient);
+
+/// grad p at every point, of the pressure that the points carry from the last step, with the
+/// operators of this one; the data at walls are those of the last gradient. What a step takes off a
+/// velocity by this gradient and gives back by the next differs by the change of the pressure
+/// alone, not by that of the operators.
+template <int dim>
+void carried_pressure_gradients(const Points<dim> &points, const Cloud<dim> &cloud,
+                                const PressureProblem<dim> &problem, VecSpan<dim> gradient);
 
 } // namespace sluice::fluid

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: MIT
 // Sparse matrices. `SparseMatrix` is the form the caller fills: compressed rows, any row scaling.
-// `SlicedRows` is the form the solver multiplies with: sixteen rows side by side (the SELL format
+// `SlicedMatrix` is the form the solver multiplies with: sixteen rows side by side (the SELL format
 // of Kreutzer, Hager, Wellein, Fehske and Bishop, SIAM J. Sci. Comput. 36, 2014, without its
 // sorting).
 #pragma once
@@ -83,32 +83,55 @@ void for_each_product(const SlicedPattern &pattern, const Value *value, const X 
   }
 }
 
+/// A square matrix in slices, its diagonal apart. Places that fill up a slice hold zeros.
+struct SlicedMatrix {
+  SlicedPattern pattern;
+  std::vector<double> diagonal;     ///< [rows], must not be zero
+  std::vector<double> off_diagonal; ///< [pattern.stored()]
+
+  int rows() const { return pattern.rows; }
+  /// Calls body(column, value) for the entries of row i off the diagonal, zeros included.
+  template <class Body> void for_each_entry(int i, Body &&body) const {
+    for (int k = 0; k < pattern.width(i); ++k)
+      body(pattern.column[pattern.place(i, k)], off_diagonal[pattern.place(i, k)]);
+  }
+};
+
+/// The same matrix in compressed rows, without the zeros.
+SparseMatrix compressed(const SlicedMatrix &matrix);
+
 /// The matrix D^-1 A of a solve, D = diag(A): unit diagonal, which is not stored, and off-diagonal
 /// entries in double for the outer iteration and in float for the preconditioner. Rows scaled this
 /// way have comparable size whatever their kind, and residuals have the unit of the unknown.
 class ScaledMatrix {
 public:
+  ScaledMatrix() = default;
+  ScaledMatrix(const ScaledMatrix &) = delete;
+  ScaledMatrix &operator=(const ScaledMatrix &) = delete;
+
+  /// Keeps a reference to `a`, whose doubles the outer iteration reads.
+  void build(const SlicedMatrix &a);
+  /// Keeps a copy of `a` in slices.
   void build(const SparseMatrix &a);
 
-  int rows() const { return pattern_.rows; }
+  int rows() const { return matrix_->rows(); }
   std::size_t entries() const { return entries_; }
-  const SlicedPattern &pattern() const { return pattern_; }
-  const std::vector<double> &off_diagonal() const { return value_; }
+  const SlicedPattern &pattern() const { return matrix_->pattern; }
   const std::vector<float> &off_diagonal_float() const { return value_float_; }
   /// 1 / a_ii
   double inverse_diagonal(int i) const { return inverse_diagonal_[i]; }
   /// body(i, (D^-1 A x)_i) for the rows of `range`, whose begin is a multiple of 16.
   template <class X, class Body> void multiply(const X *x, IndexRange range, Body &&body) const {
-    for_each_product<double>(pattern_, value_.data(), x, range,
-                             [&](int i, double product) { body(i, x[i] + product); });
+    for_each_product<double>(
+        pattern(), matrix_->off_diagonal.data(), x, range,
+        [&](int i, double product) { body(i, x[i] + inverse_diagonal_[i] * product); });
   }
 
 private:
-  void fill_row(const SparseMatrix &a, int i);
-
+  const SlicedMatrix *matrix_ = &sliced_;
+  SlicedMatrix sliced_; // of compressed rows
   std::size_t entries_ = 0;
-  SlicedPattern pattern_;
-  std::vector<double> value_, inverse_diagonal_;
+  std::vector<double> inverse_diagonal_; // filled up to whole slices
   std::vector<float> value_float_;
 };
 

@@ -18,6 +18,7 @@ FluidSolver<dim>::FluidSolver(const Scene<dim> &scene)
   pressure_params_.row_guard = params_.row_guard;
   pressure_params_.gradient_guard = params_.gradient_guard;
   cloud_.has_air = params_.free_surface;
+  cloud_.remembers_cells = params_.remember_cells;
   nodal_forces_.assign(walls.position.size(), Vec<dim>::Zero());
 }
 
@@ -61,8 +62,8 @@ template <int dim> void FluidSolver<dim>::end_step() {
   Points<dim> &points = state.points;
   timer("project", [&] {
     const double factor = projection_dt_ / params_.density;
+    pressure_gradients(points, cloud_, problem_, points.pressure, points.pressure_gradient);
     for_each_point(points.size(), [&](int i) {
-      points.pressure_gradient[i] = pressure_gradient(i, points, cloud_, problem_, points.pressure);
       points.previous_velocity[i] = points.velocity[i];
       points.velocity[i] = predicted_[i] - factor * points.pressure_gradient[i];
     });
@@ -117,7 +118,7 @@ template <int dim> void FluidSolver<dim>::leave_through_outlet() {
     low = low.cwiseMin(x);
     high = high.cwiseMax(x);
   }
-  std::vector<char> leaves(points.size(), 0);
+  leaves_.assign(points.size(), 0);
   bool any = false;
   for (int i = 0; i < points.size(); ++i) {
     const Vec<dim> &x = points.position[i];
@@ -125,15 +126,15 @@ template <int dim> void FluidSolver<dim>::leave_through_outlet() {
     const bool is_lost = !is_out && is_outside(x, low, high, params_.spacing);
     state.outflow_points += is_out;
     state.lost_points += is_lost;
-    leaves[i] = is_out || is_lost;
-    if (leaves[i]) {
+    leaves_[i] = is_out || is_lost;
+    if (leaves_[i]) {
       state.outlet_energy += energy_of_point(points.velocity[i], x);
       state.outlet_momentum += mass_of_point() * points.velocity[i];
     }
-    any = any || leaves[i];
+    any = any || leaves_[i] != 0;
   }
   if (any)
-    remove_points(points, leaves);
+    remove_points(points, leaves_);
   check(points.size() > 0,
         "step {}: no water is left in the scene ({} points left through the outlet, {} were lost); "
         "end the run earlier",
@@ -154,6 +155,7 @@ template <int dim> void FluidSolver<dim>::freeze_cloud() {
   });
   timer("search", [&] { update_neighbours(points, walls, cloud_); });
   timer("cells", [&] { update_cells(points, cloud_); });
+  report_.cells_cut = cloud_.cells_cut;
 }
 
 // The velocity from which the step's forces act over projection_dt_: that of the last step, or of
@@ -179,9 +181,9 @@ template <int dim> void FluidSolver<dim>::push_by_known_forces() {
   if (params_.time_order == 1 &&
       is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
     return;
+  carried_pressure_gradients(points, cloud_, problem_, push_);
   for_each_point(points.size(), [&](int i) {
-    const Vec<dim> gradient = carried_pressure_gradient(i, points, cloud_, problem_);
-    push_[i] = projection_dt_ * (params_.gravity - gradient / params_.density);
+    push_[i] = projection_dt_ * (params_.gravity - push_[i] / params_.density);
     predicted_[i] += push_[i];
   });
 }
@@ -196,7 +198,7 @@ template <int dim> void FluidSolver<dim>::predict_velocity() {
         diffuse_velocity(points, walls, cloud_, params_.rheology, params_.density, projection_dt_,
                          predicted_, viscous_);
     update_surface_pressure(cloud_, viscosity(), predicted_, projection_dt_ / params_.density,
-                            points);
+                            points, surface_);
     report_.viscous_iterations = result.iterations;
     report_.viscous_passes = result.passes;
     report_.viscous_rows = viscous_.rows.count;
@@ -217,15 +219,15 @@ template <int dim> void FluidSolver<dim>::assemble() {
                                          target_divergence_, projection_dt_, cloud_, problem_);
   });
   timer("pressure set-up", [&] {
-    std::vector<Cell> cells(points.size());
+    cells_.resize(points.size());
     for_each_point(points.size(), [&](int i) {
       const Vec<dim> c = (points.position[i] - cloud_.grid.origin) / (2 * cloud_.spacing);
-      cells[i] = {};
+      cells_[i] = {};
       for (int d = 0; d < dim; ++d)
-        cells[i][d] = static_cast<int>(c[d]);
+        cells_[i][d] = static_cast<int>(c[d]);
     });
     scaled_.build(problem_.matrix);
-    multigrid_.build(scaled_, cells);
+    multigrid_.build(scaled_, cells_);
   });
   timer("loads",
         [&] { build_wall_quadrature(points, walls, cloud_, WallPart::coupled, quadrature_); });

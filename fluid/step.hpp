@@ -9,6 +9,7 @@
 #include "fluid/multigrid.hpp"
 #include "fluid/pressure.hpp"
 #include "fluid/scene.hpp"
+#include "fluid/surface_stress.hpp"
 #include "fluid/viscosity.hpp"
 #include "fluid/wall_loads.hpp"
 
@@ -27,6 +28,7 @@ template <int dim> struct StepReport {
   int pressure_solves = 0;
   Vec<dim> contact_impulse = Vec<dim>::Zero(); // of walls on the points that touched them [N s/m]
   int released = 0;                            // points that bear no tension next to air
+  int cells_cut = 0; // Voronoi cells whose neighbours were not known from the last step
 };
 
 template <int dim> class FluidSolver {
@@ -79,8 +81,11 @@ private:
   PressureProblem<dim> problem_;
   ViscousProblem<dim> viscous_;
   std::vector<Vec<dim>> predicted_; // u* [m/s]
-  std::vector<Vec<dim>> push_;      // [m/s]
+  SurfacePoints surface_;
+  std::vector<Vec<dim>> push_; // [m/s]
   std::vector<double> target_divergence_;
+  std::vector<char> leaves_; // per point
+  std::vector<Cell> cells_;  // per point: of the multigrid
   ScaledMatrix scaled_;
   Multigrid multigrid_;
   KrylovMemory memory_;

@@ -44,21 +44,14 @@ template <int dim> double moment_along_surface() {
   return sum;
 }
 
-/// The surface points of a cloud, numbered on their own.
-struct SurfacePoints {
-  std::vector<int> point;  // of each number
-  std::vector<int> number; // of each point, -1: not at the surface
-};
-
-template <int dim> SurfacePoints surface_points(const Cloud<dim> &cloud) {
-  SurfacePoints surface;
+template <int dim> void number_surface(const Cloud<dim> &cloud, SurfacePoints &surface) {
+  surface.point.clear();
   surface.number.assign(cloud.kind.size(), -1);
   for (int i = 0; i < static_cast<int>(cloud.kind.size()); ++i)
     if (cloud.kind[i] == PointKind::surface) {
       surface.number[i] = static_cast<int>(surface.point.size());
       surface.point.push_back(i);
     }
-  return surface;
 }
 
 /// 1 - 2 factor div_s mu grad_s on the surface points; symmetric and positive definite.
@@ -97,27 +90,35 @@ Eigen::SparseMatrix<double> surface_diffusion(const Points<dim> &points, const C
 
 template <int dim>
 void update_surface_pressure(const Cloud<dim> &cloud, std::span<const double> viscosity,
-                             VecView<dim> velocity, double factor, Points<dim> &points) {
-  const SurfacePoints surface = surface_points(cloud);
+                             VecView<dim> velocity, double factor, Points<dim> &points,
+                             SurfacePoints &surface) {
+  number_surface(cloud, surface);
   const int n = static_cast<int>(surface.point.size());
-  Eigen::VectorXd defect(n);
+  surface.change.resize(n);
   for_each_index(n, [&](int a) {
     const int i = surface.point[a];
-    defect[a] =
+    surface.change[a] =
         2 * viscosity[i] * contraction(i, points, cloud, velocity) - points.surface_pressure[i];
   });
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(
-      surface_diffusion(points, cloud, viscosity, factor, surface));
-  const Eigen::VectorXd change = solver.solve(defect);
+  double largest = 0;
+  for (const int i : surface.point)
+    largest = std::max(largest, viscosity[i]);
+  constexpr double stiff = 0.01;
+  if (factor * largest > stiff * cloud.spacing * cloud.spacing) {
+    const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(
+        surface_diffusion(points, cloud, viscosity, factor, surface));
+    Eigen::Map<Eigen::VectorXd> change(surface.change.data(), n);
+    change = solver.solve(change).eval();
+  }
   for_each_point(points.size(), [&](int i) {
     const int a = surface.number[i];
-    points.surface_pressure[i] = a < 0 ? 0 : points.surface_pressure[i] + change[a];
+    points.surface_pressure[i] = a < 0 ? 0 : points.surface_pressure[i] + surface.change[a];
   });
 }
 
 template void update_surface_pressure(const Cloud<2> &, std::span<const double>, VecView<2>, double,
-                                      Points<2> &);
+                                      Points<2> &, SurfacePoints &);
 template void update_surface_pressure(const Cloud<3> &, std::span<const double>, VecView<3>, double,
-                                      Points<3> &);
+                                      Points<3> &, SurfacePoints &);
 
 } // namespace sluice::fluid

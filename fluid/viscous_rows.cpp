@@ -190,10 +190,11 @@ private:
   }
 
   void pressures_row(const Row &row) const {
-    const double *weights = &pressure_.matrix.value[pressure_.matrix.row_start[row.i] + 1];
+    const SlicedMatrix &matrix = pressure_.matrix;
     const double scale = -1 / (cloud_.spacing * cloud_.spacing);
     for (std::size_t k = 0; k < row.neighbours.size(); ++k)
-      row.laplacian[k] = scale * weights[k];
+      row.laplacian[k] =
+          scale * matrix.off_diagonal[matrix.pattern.place(row.i, static_cast<int>(k))];
     if constexpr (with_gradient) {
       const auto &functional = pressure_.gradient[row.i];
       for (std::size_t k = 0; k < row.neighbours.size(); ++k) {

@@ -29,11 +29,17 @@ public:
   /// The square [-half_width, half_width]^2 [m].
   explicit VoronoiCell(double half_width);
 
-  /// Keeps the part with normal . x <= offset; `normal` is a unit vector, offset > 0 [m].
-  void cut(const Vec<2> &normal, double offset);
+  /// Whose edge an edge is, where nobody was named.
+  static constexpr int nobody = -1;
+
+  /// Keeps the part with normal . x <= offset; `normal` is a unit vector, offset > 0 [m]. The new
+  /// edge is `whose`.
+  void cut(const Vec<2> &normal, double offset, int whose = nobody);
 
   int size() const { return size_; }
   const Vec<2> &corner(int k) const { return corner_[k]; }
+  /// Whose the edge from corner k to the next one is.
+  int edge_of(int k) const { return edge_[k]; }
   /// Distance of the farthest corner [m].
   double reach() const { return reach_; }
   double volume() const;   ///< [m^2]
@@ -42,6 +48,7 @@ public:
 private:
   static constexpr int capacity = 32;
   std::array<Vec<2>, capacity> corner_;
+  std::array<int, capacity> edge_;
   int size_ = 4;
   double reach_;
 };
@@ -85,10 +92,14 @@ private:
   double reach_ = 0;
 };
 
-/// Cuts along the perpendicular bisector towards a neighbour at r; skipped when out of reach.
-template <int dim> void cut_towards(VoronoiCell<dim> &cell, const Vec<dim> &r) {
+/// Cuts along the perpendicular bisector towards the neighbour j at r; skipped when out of reach.
+template <int dim> void cut_towards(VoronoiCell<dim> &cell, const Vec<dim> &r, int j = 0) {
   const double distance = r.norm();
-  if (distance > 1e-12 && distance < 2 * cell.reach())
+  if (!(distance > 1e-12 && distance < 2 * cell.reach()))
+    return;
+  if constexpr (dim == 2)
+    cell.cut(r / distance, 0.5 * distance, j);
+  else
     cell.cut(r / distance, 0.5 * distance);
 }
 
@@ -99,9 +110,10 @@ inline VoronoiCell<2>::VoronoiCell(double w) : reach_(std::sqrt(2.0) * w) {
   corner_[1] = {w, -w};
   corner_[2] = {w, w};
   corner_[3] = {-w, w};
+  std::fill_n(edge_.begin(), 4, nobody);
 }
 
-inline void VoronoiCell<2>::cut(const Vec<2> &normal, double offset) {
+inline void VoronoiCell<2>::cut(const Vec<2> &normal, double offset, int whose) {
   std::array<double, capacity> height;
   bool any_outside = false;
   for (int k = 0; k < size_; ++k) {
@@ -111,21 +123,25 @@ inline void VoronoiCell<2>::cut(const Vec<2> &normal, double offset) {
   if (!any_outside)
     return;
   std::array<Vec<2>, capacity> old;
+  std::array<int, capacity> old_edge;
   std::copy_n(corner_.begin(), size_, old.begin());
+  std::copy_n(edge_.begin(), size_, old_edge.begin());
   int n = 0;
   double reach2 = 0;
-  const auto push = [&](const Vec<2> &x) {
+  const auto push = [&](const Vec<2> &x, int edge) {
     if (n == capacity)
       return;
-    corner_[n++] = x;
+    corner_[n] = x;
+    edge_[n++] = edge;
     reach2 = std::max(reach2, x.squaredNorm());
   };
   for (int k = 0; k < size_; ++k) {
     const int m = k + 1 == size_ ? 0 : k + 1;
     if (height[k] <= 0)
-      push(old[k]);
+      push(old[k], old_edge[k]);
     if ((height[k] <= 0) != (height[m] <= 0))
-      push(old[k] + height[k] / (height[k] - height[m]) * (old[m] - old[k]));
+      push(old[k] + height[k] / (height[k] - height[m]) * (old[m] - old[k]),
+           height[k] <= 0 ? whose : old_edge[k]);
   }
   size_ = n;
   reach_ = std::sqrt(reach2);

@@ -141,9 +141,10 @@ void build_wall_quadrature(const Points<dim> &points, const Walls<dim> &walls,
 template <int dim>
 void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud,
                         const PressureProblem<dim> &problem, std::span<const double> pressure,
-                        std::span<const double> viscosity, const WallQuadrature<dim> &quadrature,
+                        std::span<const double> viscosity, WallQuadrature<dim> &quadrature,
                         std::vector<Vec<dim>> &traction) {
-  std::vector<Vec<dim>> gradient(quadrature.feeders.size());
+  std::vector<Vec<dim>> &gradient = quadrature.gradient;
+  gradient.resize(quadrature.feeders.size());
   for_each_index(static_cast<int>(gradient.size()), [&](int f) {
     gradient[f] = pressure_gradient(quadrature.feeders[f], points, cloud, problem, pressure);
   });
@@ -195,7 +196,7 @@ template void build_wall_quadrature(const Points<2> &, const Walls<2> &, const C
                                     WallQuadrature<2> &);
 template void evaluate_tractions(const Points<2> &, const Walls<2> &, const Cloud<2> &,
                                  const PressureProblem<2> &, std::span<const double>,
-                                 std::span<const double>, const WallQuadrature<2> &,
+                                 std::span<const double>, WallQuadrature<2> &,
                                  std::vector<Vec<2>> &);
 template void integrate_nodal_forces(const Walls<2> &, const WallQuadrature<2> &, VecView<2>,
                                      VecSpan<2>);
@@ -204,7 +205,7 @@ template void build_wall_quadrature(const Points<3> &, const Walls<3> &, const C
                                     WallQuadrature<3> &);
 template void evaluate_tractions(const Points<3> &, const Walls<3> &, const Cloud<3> &,
                                  const PressureProblem<3> &, std::span<const double>,
-                                 std::span<const double>, const WallQuadrature<3> &,
+                                 std::span<const double>, WallQuadrature<3> &,
                                  std::vector<Vec<3>> &);
 template void integrate_nodal_forces(const Walls<3> &, const WallQuadrature<3> &, VecView<3>,
                                      VecSpan<3>);

@@ -30,6 +30,7 @@ template <int dim> struct WallQuadrature {
   std::vector<Contribution> contributions; // `feeder` counts in `feeders`
   std::vector<int> feeders;                // the fluid points that contribute, each once
   std::vector<int> feeder_of_point;        // -1: none
+  std::vector<Vec<dim>> gradient;          // of the pressure at the feeders, when last evaluated
 };
 
 /// Resultant on part of the walls [N, N m], in the plane per metre of depth; moment about the
@@ -52,7 +53,7 @@ void build_wall_quadrature(const Points<dim> &points, const Walls<dim> &walls,
 template <int dim>
 void evaluate_tractions(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud,
                         const PressureProblem<dim> &problem, std::span<const double> pressure,
-                        std::span<const double> viscosity, const WallQuadrature<dim> &quadrature,
+                        std::span<const double> viscosity, WallQuadrature<dim> &quadrature,
                         std::vector<Vec<dim>> &traction);
 
 /// Consistent nodal forces [N/m] on all wall vertices: sum of traction times linear shape function.

@@ -265,10 +265,10 @@ void find_near_faces(const Walls<dim> &walls, const Grid<dim> &grid, double reac
   for (int c = 0; c < grid.n_cells(); ++c)
     near.start[c + 1] += near.start[c];
   near.face.resize(near.start.back());
-  std::vector<int> next(near.start.begin(), near.start.end() - 1);
+  near.next.assign(near.start.begin(), near.start.end() - 1);
   for (int k = 0; k < static_cast<int>(walls.faces.size()); ++k)
     for_each_cell_near(walls, walls.faces[k], grid, reach,
-                       [&](int c) { near.face[next[c]++] = k; });
+                       [&](int c) { near.face[near.next[c]++] = k; });
 }
 
 // --- links --------------------------------------------------------------------------------------

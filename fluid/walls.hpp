@@ -94,6 +94,7 @@ template <int dim> struct PointWalls {
 struct FaceGrid {
   std::vector<int> start; // n_cells + 1
   std::vector<int> face;
+  std::vector<int> next; // while it is filled
   std::span<const int> near(int cell) const {
     return {face.data() + start[cell], face.data() + start[cell + 1]};
   }

@@ -7,6 +7,6 @@ namespace sluice::fluid {
 /// Weight of a neighbour at the distance q = |r| / radius, 0 <= q <= 1: W = (1 - q)^2.
 /// The same W enters moments, numerators and denominators; otherwise linear fields are not
 /// reproduced.
-inline double weight(double q) { return (1 - q) * (1 - q); }
+template <class Number> Number weight(const Number &q) { return (1.0 - q) * (1.0 - q); }
 
 } // namespace sluice::fluid

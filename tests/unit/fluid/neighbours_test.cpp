@@ -24,7 +24,8 @@ TEST(Neighbours, OfARandomCloudAreThoseOfBruteForce) {
   const Grid<2> grid = grid_over(points, radius);
   CellRanges ranges;
   NeighbourLists lists;
-  sort_by_cell(points, grid, ranges);
+  SortMemory<2> memory;
+  sort_by_cell(points, grid, ranges, memory);
   find_neighbours(points, grid, ranges, radius, lists);
   for (int i = 0; i < points.size(); ++i) {
     std::vector<int> expected;
@@ -70,7 +71,8 @@ TEST(Neighbours, SortingKeepsEveryPointsDataTogether) {
   }
   CellRanges ranges;
   const Grid<2> grid = grid_over(points, 0.1);
-  sort_by_cell(points, grid, ranges);
+  SortMemory<2> memory;
+  sort_by_cell(points, grid, ranges, memory);
   int moved = 0;
   for (int k = 0; k < points.size(); ++k) {
     const int i = points.id[k];

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/diagnostics.hpp"
 #include "fluid/parallel.hpp"
+#include "tests/support/allocation_counter.hpp"
 #include "tests/support/fluid_cases.hpp"
 
 #include <gtest/gtest.h>
@@ -132,6 +133,35 @@ TEST(Step, ARestoredStateRepeatsItsStepsToTheBit) {
   expect_same_bits(solver.state.points, first.points);
   EXPECT_EQ(solver.state.step, first.step);
   EXPECT_EQ(solver.state.wall_returns, first.wall_returns);
+}
+
+TEST(Step, CellsThatAreKnownFromTheLastStepAreThoseThatAreCutAnew) {
+  FluidSolver<2> knows(testing::scene_of(testing::dam_break)),
+      cuts(testing::scene_of(testing::dam_break, {"fluid.remember_cells=false"}));
+  double cut = 0, points = 0;
+  for (int k = 0; k < 40; ++k) {
+    advance(knows, 5e-4, 1);
+    advance(cuts, 5e-4, 1);
+    cut += knows.report().cells_cut;
+    points += knows.state.points.size();
+    EXPECT_EQ(cuts.report().cells_cut, cuts.state.points.size());
+  }
+  expect_same_bits(knows.state.points, cuts.state.points);
+  EXPECT_LT(cut, 0.5 * points);
+  RecordProperty("share_cut", fmt::format("{:.3f}", cut / points));
+}
+
+// Lists may grow while the water spreads; their memory grows in large pieces, so most steps need
+// none. One thread, since the first loop of a new one allocates too.
+TEST(Step, AllocatesNothingAfterTheFirstSteps) {
+  const int threads = number_of_threads();
+  set_number_of_threads(1);
+  FluidSolver<2> solver(testing::scene_of(testing::dam_break));
+  advance(solver, 5e-4, 10);
+  const long before = sluice::testing::allocations();
+  advance(solver, 5e-4, 5);
+  EXPECT_EQ(sluice::testing::allocations(), before);
+  set_number_of_threads(threads);
 }
 
 TEST(Step, ChangeOfMomentumIsWeightPlusWallImpulses) {

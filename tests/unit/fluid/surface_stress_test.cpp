@@ -21,13 +21,14 @@ FrozenCloud basin() {
 
 TEST(SurfaceStress, AStretchedSurfaceIsUnderTheTensionOfItsFluid) {
   FrozenCloud frozen = basin();
+  SurfacePoints surface;
   constexpr double rate = 3, mu = 2;
   const auto velocity =
       frozen.values([](const Vec<2> &x) { return Vec<2>(rate * x.x(), -rate * x.y()); });
   const std::vector<double> viscosity(frozen.size(), mu);
   for (const double factor : {1e-9, 1e-3, 1e3}) { // uniform along the surface: any step
     frozen.points.surface_pressure.assign(frozen.size(), 0);
-    update_surface_pressure<2>(frozen.cloud, viscosity, velocity, factor, frozen.points);
+    update_surface_pressure<2>(frozen.cloud, viscosity, velocity, factor, frozen.points, surface);
     int n_surface = 0;
     for (int i = 0; i < frozen.size(); ++i) {
       const bool is_open = frozen.cloud.kind[i] == PointKind::surface;
@@ -52,9 +53,8 @@ TEST(SurfaceStress, APressureOutsideRaisesThatInsideAndPushesNothing) {
   assemble_pressure_source<2>(frozen.points, frozen.cloud, params, velocity, target, 1e-3, problem);
   const std::vector<double> pressure(frozen.size(), outside);
   for (int i = 0; i < frozen.size(); ++i) {
-    double row = 0;
-    for (int k = problem.matrix.row_start[i]; k < problem.matrix.row_start[i + 1]; ++k)
-      row += problem.matrix.value[k] * outside;
+    double row = problem.matrix.diagonal[i] * outside;
+    problem.matrix.for_each_entry(i, [&](int, double value) { row += value * outside; });
     EXPECT_NEAR(row, problem.fluid_source[i], 1e-12);
     EXPECT_NEAR(pressure_gradient(i, frozen.points, frozen.cloud, problem, pressure).norm(), 0,
                 1e-12);

@@ -9,18 +9,19 @@ namespace {
 
 constexpr double weight_density = 9810, depth = 0.14, gate = 0.079;
 
-FluidSolver<2> still_water(const std::string &spacing) {
-  FluidSolver<2> solver(testing::scene_of(
-      testing::gate_tank(), {"fluid.spacing_m=" + spacing, "fluid.pressure_tolerance=1e-12"}));
-  solver.begin_step(1e-3);
-  solver.iterate();
-  return solver;
-}
+struct StillWater : FluidSolver<2> {
+  explicit StillWater(const std::string &spacing)
+      : FluidSolver<2>(testing::scene_of(
+      testing::gate_tank(), {"fluid.spacing_m=" + spacing, "fluid.pressure_tolerance=1e-12"})) {
+    begin_step(1e-3);
+    iterate();
+  }
+};
 
 class HydrostaticLoad : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(HydrostaticLoad, OnTheGateHasTheExactResultantAndMomentAboutTheClamp) {
-  const FluidSolver<2> solver = still_water(GetParam());
+  const StillWater solver(GetParam());
   const Resultant<2> load = integrate_resultant(solver.quadrature(), solver.tractions());
   // pressure rho g (H - y) over 0 < y < L; moment about (0.1, L): integral of p (L - y)
   const double force = weight_density * (depth * gate - 0.5 * gate * gate);
@@ -34,7 +35,7 @@ TEST_P(HydrostaticLoad, OnTheGateHasTheExactResultantAndMomentAboutTheClamp) {
 }
 
 TEST_P(HydrostaticLoad, LeavesTheLowerEdgeAndTheDryFaceOfASealedGateDry) {
-  const FluidSolver<2> solver = still_water(GetParam());
+  const StillWater solver(GetParam());
   EXPECT_GT(solver.quadrature().samples.size(), 30u);
   for (const auto &sample : solver.quadrature().samples)
     EXPECT_NEAR(sample.position.x(), 0.1, 1e-12) << "wet at y = " << sample.position.y();
@@ -47,7 +48,7 @@ TEST_P(HydrostaticLoad, LeavesTheLowerEdgeAndTheDryFaceOfASealedGateDry) {
 INSTANTIATE_TEST_SUITE_P(Spacings, HydrostaticLoad, ::testing::Values("0.004", "0.002"));
 
 TEST(WallLoads, NodalForcesHaveTheSumAndTheMomentOfTheTractions) {
-  FluidSolver<2> solver = still_water("0.004");
+  StillWater solver("0.004");
   for (const int v : solver.walls.coupled_vertices)
     solver.walls.velocity[v] = {0.1 * solver.walls.position[v].y(), -0.02};
   solver.iterate();
@@ -66,7 +67,7 @@ TEST(WallLoads, NodalForcesHaveTheSumAndTheMomentOfTheTractions) {
 }
 
 TEST(WallLoads, WeightsOfASampleArePositiveAndSumToOne) {
-  const FluidSolver<2> solver = still_water("0.004");
+  const StillWater solver("0.004");
   const WallQuadrature<2> &quadrature = solver.quadrature();
   for (const auto &sample : quadrature.samples) {
     double total = 0;
@@ -79,7 +80,7 @@ TEST(WallLoads, WeightsOfASampleArePositiveAndSumToOne) {
 }
 
 TEST(WallLoads, ASegmentAboveTheWaterCarriesNothing) {
-  const FluidSolver<2> solver = still_water("0.004");
+  const StillWater solver("0.004");
   WallQuadrature<2> all;
   build_wall_quadrature(solver.state.points, solver.walls, solver.cloud(), WallPart::all, all);
   double wet_tank = 0;
