@@ -313,6 +313,7 @@ template <int dim> Points<dim> fill(const FluidParams<dim> &params, const Walls<
   points.pressure_gradient.assign(n, params.density * params.gravity);
   points.pressure = hydrostatic_pressure(params, points.position);
   points.surface_pressure.assign(n, 0);
+  points.strain_rate.assign(n, 0);
   points.at_surface.assign(n, SurfaceMemory::enclosed);
   points.id.resize(n);
   for (std::size_t i = 0; i < n; ++i)

@@ -111,7 +111,6 @@ void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cl
                                  const MotionParams &params, double pace,
                                  std::span<double> divergence) {
   const double volume = volume_of_point<dim>(cloud.spacing);
-  const double rate = params.volume_rate * pace;
   constexpr double largest_error = 0.3;
   for_each_pack(points.size(), [&](int first) {
     const PackedStencil<dim> s(first, points, cloud);
@@ -125,10 +124,11 @@ void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cl
       total += w;
     }
     for (int l = 0; l < s.count(); ++l) {
-      const bool is_interior = cloud.kind[first + l] == PointKind::interior;
+      const int i = first + l;
+      const bool is_interior = cloud.kind[i] == PointKind::interior;
       const double error = 1 - filled[l] / (total[l] * volume);
-      divergence[first + l] =
-          is_interior ? rate * std::clamp(error, -largest_error, largest_error) : 0.0;
+      const double rate = params.volume_rate * std::max(pace, points.strain_rate[i]);
+      divergence[i] = is_interior ? rate * std::clamp(error, -largest_error, largest_error) : 0.0;
     }
   });
 }
@@ -185,8 +185,8 @@ void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams
   const double longest = 0.1 * cloud.spacing;
   const auto shift_of = [&](int i, bool is_crowded) {
     const Mat<dim> &g = velocity_gradient[i];
-    const double strain_rate = (g + g.transpose()).norm() / std::sqrt(2.0);
-    const double strain = std::min(strain_rate * dt, 0.25);
+    points.strain_rate[i] = (g + g.transpose()).norm() / std::sqrt(2.0);
+    const double strain = std::min(points.strain_rate[i] * dt, 0.25);
     Vec<dim> shift = strain * (params.regularity * cloud.centroid_offset[i] +
                                params.agitation * cloud.spacing * own_direction<dim>(points.id[i]));
     const Vec<dim> &n = cloud.surface_normal[i];

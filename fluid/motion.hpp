@@ -46,7 +46,8 @@ ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &wa
                                        const MotionParams &params, const Cloud<dim> &cloud);
 
 /// Divergence that brings the cells back to their volume [1/s], zero at the free surface: the
-/// relative volume error, averaged over the neighbours, times volume_rate and `pace` [1/s].
+/// relative volume error, averaged over the neighbours, times volume_rate and the larger of `pace`
+/// [1/s] and the point's strain rate, by which errors come up.
 template <int dim>
 void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cloud,
                                  const MotionParams &params, double pace,

@@ -24,6 +24,7 @@ template <int dim> struct Points {
   std::vector<double> pressure;            // [Pa], mean over the last step
   std::vector<Vec<dim>> pressure_gradient; // [Pa/m], of the last step
   std::vector<double> surface_pressure;    // [Pa], outside of surface points; elsewhere 0
+  std::vector<double> strain_rate;         // [1/s], sqrt(2 E : E) in the last step
   std::vector<std::int32_t> id;            // stays with the point for its life
   std::vector<SurfaceMemory> at_surface;   // in the last step
 
@@ -40,6 +41,7 @@ template <class A, class B, class Body> void for_each_pair_of_arrays(A &a, B &b,
   body("pressure", a.pressure, b.pressure);
   body("pressure_gradient", a.pressure_gradient, b.pressure_gradient);
   body("surface_pressure", a.surface_pressure, b.surface_pressure);
+  body("strain_rate", a.strain_rate, b.strain_rate);
   body("id", a.id, b.id);
   body("at_surface", a.at_surface, b.at_surface);
 }

@@ -29,6 +29,7 @@ template <int dim> Points<dim> points_in(const std::vector<Vec<dim>> &position) 
     v->assign(n, Vec<dim>::Zero());
   points.pressure.assign(n, 0);
   points.surface_pressure.assign(n, 0);
+  points.strain_rate.assign(n, 0);
   points.at_surface.assign(n, SurfaceMemory::enclosed);
   for (std::size_t i = 0; i < n; ++i)
     points.id.push_back(static_cast<std::int32_t>(i));
