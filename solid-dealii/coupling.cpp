@@ -40,8 +40,7 @@ public:
       }
       const double dt = bridge.max_time_step_size();
       read_forces(bridge, dt);
-      state_ = solver_.advance(start_, load_, dt, guess_ ? &*guess_ : nullptr);
-      write_motion(bridge);
+      advance_solid(bridge, dt);
       bridge.advance(dt);
       if (bridge.requires_reading_checkpoint()) {
         guess_ = state_; // the next iterate is near: only its Newton iterations are saved
@@ -63,6 +62,17 @@ private:
   void read_forces(const bridge::Participant &bridge, double relative_time) {
     bridge.read_data("force", relative_time, forces_);
     load_ = surface_.scatter(forces_, solver_.discretisation().n_dofs());
+  }
+
+  // A window without a solution is the bridge's to cut; where it may not, it ends both programs
+  // with the reason.
+  void advance_solid(bridge::Participant &bridge, double dt) {
+    try {
+      state_ = solver_.advance(start_, load_, dt, guess_ ? &*guess_ : nullptr);
+      write_motion(bridge);
+    } catch (const NoSolution &failure) {
+      bridge.report_failure(failure.what());
+    }
   }
 
   void write_motion(bridge::Participant &bridge) const {
