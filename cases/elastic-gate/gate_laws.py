@@ -37,7 +37,8 @@ class Row:
     line: str = "-"
 
     def overrides(self):
-        return [*self.keys, "case.output_interval_s=0"]
+        # A machine that is stopped for a while must not end a run of hours.
+        return [*self.keys, "case.output_interval_s=0", "bridge.silence_deadline_s=3600"]
 
     def case_text(self):
         """The case file without what the row's law has no use for."""

@@ -81,7 +81,7 @@ Outcome couple(const std::string &name, Force force_of,
   });
   try {
     bridge::Participant bridge("solid", config, outcome.folder, std::move(ours));
-    run(bridge, config, outcome.folder);
+    run(&bridge, config, outcome.folder);
   } catch (const std::exception &error) {
     outcome.solid_error = error.what();
   }
