@@ -6,6 +6,7 @@
 
 #include "bridge/base/config.hpp"
 #include "solid-dealii/loads.hpp"
+#include "solid-dealii/ranks.hpp"
 
 #include <filesystem>
 #include <string>
@@ -15,8 +16,9 @@ namespace sluice::solid {
 /// "static": equilibrium (under water: of follower and of dead pressure); "modes": natural
 /// frequencies; "release": the load acts at once at t = 0, [case] gives step and end time, and the
 /// series of a coupled run are written into `folder`. Results are printed. `restart`: a
-/// solid_state.h5 that the release goes on from.
+/// solid_state.h5 that the release goes on from. On several ranks all of them call it.
 void run_alone(const std::string &task, const Config &config, const Hydrostatic &water,
-               const std::filesystem::path &folder, const std::filesystem::path &restart = {});
+               const std::filesystem::path &folder, const std::filesystem::path &restart = {},
+               const Ranks &ranks = {});
 
 } // namespace sluice::solid

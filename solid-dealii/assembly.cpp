@@ -53,9 +53,14 @@ Assembly<dim>::Assembly(const Discretisation<dim> &discretisation, Material mate
 }
 
 template <int dim> void Assembly<dim>::number_unknowns(const std::vector<bool> &fixed) {
-  for (const bool is_fixed : fixed)
-    unknown_of_.push_back(is_fixed ? -1 : n_free_++);
-  check(n_free_ > 0, "solid: every node is fixed; nothing is left to compute");
+  std::vector<double> numbers;
+  for (std::size_t k = 0; k < fixed.size(); ++k) {
+    unknown_of_.push_back(fixed[k] ? -1 : n_free_++);
+    if (!fixed[k])
+      numbers.push_back(dim * discretisation_.node_numbers[k / dim] + static_cast<double>(k % dim));
+  }
+  unknowns_ = SharedEntries(discretisation_.ranks, numbers);
+  check(n_free_of_all() > 0, "solid: every node is fixed; nothing is left to compute");
 }
 
 template <int dim> void Assembly<dim>::build_pattern() {
@@ -155,28 +160,36 @@ template <int dim> Eigen::VectorXd Assembly<dim>::mass_times(const Eigen::Vector
         product.template segment<dim>(dim * numbers[a]) +=
             block[b * n + a] * all.template segment<dim>(dim * numbers[b]);
   }
+  d.components.add_up(product);
   return product;
 }
 
 template <int dim> RigidMotions Assembly<dim>::rigid_motions() const {
   const auto &d = discretisation_;
+  const auto is_own = [&](int node) { return d.components.owns(dim * node); };
+  const auto n_nodes = static_cast<double>(d.components.count(d.n_dofs()) / dim);
   Vec<dim> centre = Vec<dim>::Zero();
-  for (const Vec<dim> &x : d.nodes)
-    centre += x / d.n_nodes();
+  for (int a = 0; a < d.n_nodes(); ++a)
+    if (is_own(a))
+      centre += d.nodes[static_cast<std::size_t>(a)] / n_nodes;
+  centre = d.ranks.sum(centre);
   const auto unknown = [&](int node, int c) {
     return unknown_of_[static_cast<std::size_t>(dim * node + c)];
   };
-  RigidMotions motions{dim, std::vector<int>(static_cast<std::size_t>(n_free_)),
-                       Eigen::MatrixXd::Zero(d.n_dofs(), voigt_size<dim>)};
+  RigidMotions motions{dim,     {},       0, Eigen::MatrixXd::Zero(d.n_dofs(), voigt_size<dim>),
+                       d.ranks, unknowns_};
+  Eigen::VectorXd place = Eigen::VectorXd::Zero(n_free_);
   int places = 0;
   for (int a = 0; a < d.n_nodes(); ++a) {
+    if (!is_own(a))
+      continue;
     const Vec<dim> x = d.nodes[static_cast<std::size_t>(a)] - centre;
     bool is_free = false;
     for (int c = 0; c < dim; ++c) {
       if (unknown(a, c) < 0)
         continue;
       is_free = true;
-      motions.place[static_cast<std::size_t>(unknown(a, c))] = places + c;
+      place[unknown(a, c)] = places + c;
       for (int k = 0; k < voigt_size<dim>; ++k) { // translations, then rotations in every plane
         const int i = voigt_row<dim>(k), j = voigt_column<dim>(k);
         motions.vectors(places + c, k) = k < dim  ? (c == i ? 1 : 0)
@@ -188,6 +201,10 @@ template <int dim> RigidMotions Assembly<dim>::rigid_motions() const {
     places += is_free ? dim : 0;
   }
   motions.vectors.conservativeResize(places, Eigen::NoChange);
+  motions.first = static_cast<int>(d.ranks.sum_before(places));
+  place.array() += motions.first;
+  unknowns_.copy_from_owners(place);
+  motions.place.assign(place.begin(), place.end());
   return motions;
 }
 
@@ -219,16 +236,18 @@ double Assembly<dim>::sweep(const Eigen::VectorXd &displacement, const Eigen::Ve
         cell_system<dim, nodes, modes>(discretisation_, material_, overstress, k, u, true);
     min_det = std::min(min_det, element.min_det);
     if (!(min_det > 0))
-      return min_det;
+      break;
     mirror(element.tangent);
     modes_squared += element.force.template rightCols<modes>().squaredNorm();
     stiffest =
         std::max(stiffest, element.tangent.diagonal().template head<dim * nodes>().maxCoeff());
     scatter<nodes, modes>(k, condense<dim, nodes, modes>(element));
   }
-  mode_residual_ = std::sqrt(modes_squared);
-  stiffest_ = stiffest;
-  return min_det;
+  const Ranks &ranks = discretisation_.ranks;
+  mode_residual_ = std::sqrt(ranks.sum(modes_squared));
+  stiffest_ = ranks.max(stiffest);
+  discretisation_.components.add_up(condensed_force_);
+  return ranks.min(min_det);
 }
 
 template <int dim>
@@ -252,11 +271,12 @@ void Assembly<dim>::scatter(int cell, const Condensed<dim, nodes, modes> &conden
 template <int dim>
 double Assembly<dim>::round_off_force(double k, double c,
                                       const Eigen::VectorXd &displacement) const {
-  const double length =
-      displacement.cwiseAbs().maxCoeff() + std::pow(weight_at(discretisation_, 0, 0), 1.0 / dim);
+  const Ranks &ranks = discretisation_.ranks;
+  const double length = ranks.max(displacement.cwiseAbs().maxCoeff()) +
+                        std::pow(ranks.max(weight_at(discretisation_, 0, 0)), 1.0 / dim);
   return 16 * std::numeric_limits<double>::epsilon() *
-         (k * stiffest_at_rest_ + c * mass_.diagonal().maxCoeff()) * length *
-         std::sqrt(discretisation_.n_cells());
+         (k * stiffest_at_rest_ + c * ranks.max(mass_.diagonal().maxCoeff())) * length *
+         std::sqrt(discretisation_.n_cells_of_all());
 }
 
 template <int dim>
@@ -292,6 +312,7 @@ Eigen::VectorXd Assembly<dim>::internal_force(const Eigen::VectorXd &displacemen
             element.force.col(a);
     }
   });
+  d.components.add_up(force);
   return force;
 }
 
@@ -316,7 +337,7 @@ double Assembly<dim>::smallest_det(const Eigen::VectorXd &displacement,
     const double det = F.determinant();
     smallest = std::isnan(det) ? -std::numeric_limits<double>::infinity() : std::min(smallest, det);
   });
-  return smallest;
+  return discretisation_.ranks.min(smallest);
 }
 
 template <int dim>
@@ -339,7 +360,7 @@ Eigen::VectorXd Assembly<dim>::energy_of_cells(const Eigen::VectorXd &displaceme
 template <int dim>
 double Assembly<dim>::strain_energy(const Eigen::VectorXd &displacement,
                                     const Eigen::VectorXd &modes) const {
-  return energy_of_cells(displacement, modes).sum();
+  return discretisation_.ranks.sum(energy_of_cells(displacement, modes).sum());
 }
 
 // Calls action(cell, det F, VolumeField) for every cell of a mixed element.

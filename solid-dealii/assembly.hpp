@@ -4,6 +4,8 @@
 // Fixed components (zero, or held at the value given in the displacement) are left out of the
 // matrices by numbering only the free ones. Work arrays and the place of every element entry in the
 // sparse matrix are made once.
+//
+// On several ranks the matrices are those of the cells here; sums, norms and forces are the body's.
 #pragma once
 
 #include "solid-dealii/discretisation.hpp"
@@ -24,9 +26,16 @@ public:
            const std::vector<bool> &fixed);
 
   int n_free() const { return n_free_; }
+  /// Free unknowns of the body on all ranks.
+  long n_free_of_all() const { return static_cast<long>(unknowns_.count(n_free_)); }
   /// The entries of a vector over all components that belong to free ones, and back.
   Eigen::VectorXd restrict_to_free(const Eigen::VectorXd &all) const;
   void add_to_free(Eigen::VectorXd &all, double factor, const Eigen::VectorXd &free) const;
+
+  /// Euclidean norm of the free entries of a vector over all components.
+  double norm_of_free(const Eigen::VectorXd &all) const {
+    return unknowns_.norm(restrict_to_free(all));
+  }
 
   /// Translations and small rotations of the whole body.
   RigidMotions rigid_motions() const;
@@ -89,7 +98,8 @@ private:
   const Discretisation<dim> &discretisation_;
   Material material_;
   int n_free_ = 0;
-  std::vector<int> unknown_of_;   // free unknown of a component, -1 where fixed
+  std::vector<int> unknown_of_; // free unknown of a component, -1 where fixed
+  SharedEntries unknowns_;
   std::vector<int> place_;        // of an element entry in the matrix values, -1 where fixed
   std::vector<double> cell_mass_; // [cell][node][node], one component
   SparseMatrix mass_, tangent_;

@@ -2,9 +2,11 @@
 #include "solid-dealii/coupling.hpp"
 
 #include "bridge/base/progress.hpp"
-#include "bridge/participant.hpp"
 #include "bridge/run_summary.hpp"
+#include "bridge/settings.hpp"
 #include "solid-dealii/history.hpp"
+#include "solid-dealii/interface_of_ranks.hpp"
+#include "solid-dealii/partner.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -22,14 +24,18 @@ template <int dim> Interface<dim> interface_of(const SolidSolver<dim> &solver) {
 /// One coupled run.
 template <int dim> class Run {
 public:
-  Run(const SolidParams &params, const bridge::CaseSettings &settings, std::filesystem::path folder)
-      : solver_(params), folder_(std::move(folder)), output_interval_(settings.output_interval),
-        surface_(interface_of(solver_)), progress_("solid", settings.end_time),
-        state_(solver_.initial_state()),
-        forces_(static_cast<std::size_t>(surface_.mesh.dim * surface_.n_nodes())) {}
+  Run(const SolidParams &params, const bridge::CaseSettings &settings, std::filesystem::path folder,
+      const Ranks &ranks)
+      : solver_(params, ranks), folder_(std::move(folder)),
+        output_interval_(settings.output_interval),
+        surface_(interface_of(solver_), solver_.discretisation()), state_(solver_.initial_state()),
+        forces_(surface_.mesh().positions.size()) {
+    if (ranks.is_root())
+      progress_.emplace("solid", settings.end_time);
+  }
 
-  void coupled(bridge::Participant &bridge) {
-    bridge.set_mesh(surface_.mesh);
+  void coupled(Partner bridge) {
+    bridge.set_mesh(surface_.mesh());
     bridge.initialize();
     // Only now: a partner that never comes must not cost the series of an earlier run.
     history_.emplace(solver_, folder_, output_interval_);
@@ -40,8 +46,7 @@ public:
       }
       const double dt = bridge.max_time_step_size();
       read_forces(bridge, dt);
-      state_ = solver_.advance(start_, load_, dt, guess_ ? &*guess_ : nullptr);
-      write_motion(bridge);
+      advance_solid(bridge, dt);
       bridge.advance(dt);
       if (bridge.requires_reading_checkpoint()) {
         guess_ = state_; // the next iterate is near: only its Newton iterations are saved
@@ -60,63 +65,81 @@ public:
   }
 
 private:
-  void read_forces(const bridge::Participant &bridge, double relative_time) {
+  void read_forces(const Partner &bridge, double relative_time) {
     bridge.read_data("force", relative_time, forces_);
-    load_ = surface_.scatter(forces_, solver_.discretisation().n_dofs());
+    load_ = surface_.scatter(forces_);
   }
 
-  void write_motion(bridge::Participant &bridge) const {
+  // A window without a solution is the bridge's to cut; where it may not, it ends both programs
+  // with the reason.
+  void advance_solid(Partner &bridge, double dt) {
+    try {
+      state_ = solver_.advance(start_, load_, dt, guess_ ? &*guess_ : nullptr);
+      write_motion(bridge);
+    } catch (const NoSolution &failure) {
+      bridge.report_failure(failure.what());
+    }
+  }
+
+  void write_motion(Partner &bridge) const {
     bridge.write_data("displacement", surface_.gather(state_.displacement));
     bridge.write_data("velocity", surface_.gather(state_.velocity));
   }
 
   // Sums from the solver's own load vector, about the accepted configuration.
-  void finish_window(bridge::Participant &bridge) {
+  void finish_window(Partner &bridge) {
     bridge.report_totals(bridge::interface_totals(
-        surface_.mesh.dim, surface_.mesh.positions, surface_.gather_forces(load_),
+        surface_.mesh().dim, surface_.mesh().positions, surface_.gather_forces(load_),
         surface_.gather(start_.displacement), surface_.gather(state_.displacement)));
-    history_->record(start_, state_, load_, bridge.time());
-    progress_.update(bridge.time(), history_->note());
+    const double time = bridge.time();
+    history_->record(start_, state_, load_, time);
+    if (progress_)
+      progress_->update(time, history_->note());
   }
 
   SolidSolver<dim> solver_;
   std::filesystem::path folder_;
   double output_interval_; // [s]
-  Interface<dim> surface_;
+  InterfaceOfRanks<dim> surface_;
   std::optional<History<dim>> history_;
-  Progress progress_;
-  SolidState state_, start_;        // now, and at the start of the window
-  std::optional<SolidState> guess_; // the last iterate of the same window
+  std::optional<Progress> progress_; // on the root
+  SolidState state_, start_;         // now, and at the start of the window
+  std::optional<SolidState> guess_;  // the last iterate of the same window
   std::vector<double> forces_;
   Eigen::VectorXd load_;
 };
 
 template <int dim>
-void run_in(bridge::Participant &bridge, const SolidParams &params,
-            const std::filesystem::path &folder) {
-  Run<dim> run(params, bridge.case_settings(), folder);
+void run_in(bridge::Participant *bridge, const SolidParams &params, const Config &config,
+            const std::filesystem::path &folder, const Ranks &ranks) {
+  Run<dim> run(params, config.read<bridge::CaseSettings>("case"), folder, ranks);
+  if (!bridge)
+    return run.coupled({nullptr, ranks});
   try {
-    run_coupled(bridge, [&] { run.coupled(bridge); });
+    run_coupled(*bridge, [&] { run.coupled({bridge, ranks}); });
   } catch (const std::exception &error) {
-    run.write_summary(error.what(), bridge);
+    run.write_summary(error.what(), *bridge);
     throw;
   }
-  run.write_summary("", bridge);
+  run.write_summary("", *bridge);
 }
 
 } // namespace
 
-void run(bridge::Participant &bridge, const Config &config, const std::filesystem::path &folder) {
+void run(bridge::Participant *bridge, const Config &config, const std::filesystem::path &folder,
+         const Ranks &ranks) {
   const auto params = read_params(config);
   if (params.dimension == 2)
-    run_in<2>(bridge, params, folder);
+    run_in<2>(bridge, params, config, folder, ranks);
   else
-    run_in<3>(bridge, params, folder);
+    run_in<3>(bridge, params, config, folder, ranks);
 }
 
-void run(const Config &config, const std::filesystem::path &folder) {
-  bridge::Participant bridge("solid", config, folder);
-  run(bridge, config, folder);
+void run(const Config &config, const std::filesystem::path &folder, const Ranks &ranks) {
+  std::optional<bridge::Participant> bridge;
+  if (ranks.is_root())
+    bridge.emplace("solid", config, folder);
+  run(bridge ? &*bridge : nullptr, config, folder, ranks);
 }
 
 } // namespace sluice::solid

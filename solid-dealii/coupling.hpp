@@ -4,6 +4,7 @@
 #pragma once
 
 #include "bridge/base/config.hpp"
+#include "solid-dealii/ranks.hpp"
 
 #include <filesystem>
 
@@ -15,9 +16,12 @@ namespace sluice::solid {
 
 /// Runs the case to its end, writing into `folder` once the partner is met. Throws UserError on any
 /// failure, after the partner has been told and the summary of what was computed has been written.
-void run(const Config &config, const std::filesystem::path &folder);
+/// On several ranks all of them call it, and the root speaks to the partner.
+void run(const Config &config, const std::filesystem::path &folder, const Ranks &ranks = {});
 
-/// The same with a participant that is already made (tests: one that speaks to a thread).
-void run(bridge::Participant &bridge, const Config &config, const std::filesystem::path &folder);
+/// The same with a participant that is already made (tests: one that speaks to a thread); null on
+/// other ranks than the root.
+void run(bridge::Participant *bridge, const Config &config, const std::filesystem::path &folder,
+         const Ranks &ranks = {});
 
 } // namespace sluice::solid

@@ -1,13 +1,17 @@
 // SPDX-License-Identifier: MIT
 #include "solid-dealii/dealii_mesh.hpp"
+#include "solid-dealii/ranks_mpi.hpp"
 
 #include <deal.II/base/multithread_info.h>
 #include <deal.II/base/quadrature_lib.h>
+#include <deal.II/distributed/fully_distributed_tria.h>
+#include <deal.II/dofs/dof_tools.h>
 #include <deal.II/fe/fe_tools.h>
 #include <deal.II/fe/fe_values.h>
 #include <deal.II/fe/mapping_q1.h>
 #include <deal.II/grid/grid_generator.h>
 #include <deal.II/grid/grid_tools.h>
+#include <deal.II/grid/tria_description.h>
 
 #include <Eigen/Geometry>
 
@@ -87,23 +91,48 @@ template <int dim> void make_triangulation(const MeshFile &mesh, dealii::Triangu
   grid.create_triangulation(points, cells, none);
 }
 
+// The whole body, or this rank's part of it. Every rank makes the whole mesh once, to cut it as the
+// others do (METIS, by the graph of the cells), and keeps its part.
+template <int dim, class Source>
+std::unique_ptr<dealii::Triangulation<dim>> part_of(const Source &source, const Ranks &ranks) {
+  auto whole = std::make_unique<dealii::Triangulation<dim>>();
+  make_triangulation(source, *whole);
+  if (ranks.is_one())
+    return whole;
+  check(static_cast<int>(whole->n_active_cells()) >= ranks.size(),
+        "solid: {} cells cannot be shared by {} ranks; take fewer", whole->n_active_cells(),
+        ranks.size());
+  const MPI_Comm communicator = mpi_communicator(ranks);
+  dealii::GridTools::partition_triangulation(static_cast<unsigned int>(ranks.size()), *whole);
+  auto part =
+      std::make_unique<dealii::parallel::fullydistributed::Triangulation<dim>>(communicator);
+  part->create_triangulation(
+      dealii::TriangulationDescription::Utilities::create_description_from_triangulation(
+          *whole, communicator));
+  return part;
+}
+
 // Makes all of a Discretisation from the mesh; one object so that the passes share FEValues'
 // inputs.
 template <int dim> class Builder {
 public:
-  template <class Source> Builder(const Source &source, ElementKind kind) {
+  template <class Source> Builder(const Source &source, ElementKind kind, const Ranks &ranks) {
     // With tasks the last bit of the set-up depends on how many threads there are.
     dealii::MultithreadInfo::set_thread_limit(1);
     result_.kind = kind;
     result_.degree = degree_of(kind);
+    result_.ranks = ranks;
     mesh_ = std::make_shared<DealiiMesh<dim>>(result_.degree);
-    make_triangulation(source, mesh_->triangulation);
-    mesh_->nodes.reinit(mesh_->triangulation);
+    mesh_->triangulation = part_of<dim>(source, ranks);
+    mesh_->nodes.reinit(*mesh_->triangulation);
     mesh_->nodes.distribute_dofs(mesh_->element);
+    own_nodes_ = dealii::DoFTools::extract_locally_active_dofs(mesh_->nodes);
   }
 
   Discretisation<dim> build(const Box<dim> &) {
     integrate();
+    for (int side = 0; side < 2 * dim; ++side) // a part of the body may have no face there
+      result_.boundaries[name_of(static_cast<Side>(side))];
     for (std::size_t f = 0; f < result_.faces.size(); ++f)
       result_.boundaries[name_of(result_.faces[f].side)].push_back(static_cast<int>(f));
     return finish();
@@ -136,8 +165,19 @@ private:
     collect_boundary();
   }
   Discretisation<dim> finish() {
+    std::vector<double> components;
+    for (const auto number : own_nodes_) {
+      result_.node_numbers.push_back(static_cast<double>(number));
+      for (int c = 0; c < dim; ++c)
+        components.push_back(static_cast<double>(dim * number) + c);
+    }
+    result_.components = SharedEntries(result_.ranks, components);
     result_.mesh = std::move(mesh_);
     return std::move(result_);
+  }
+
+  int local(dealii::types::global_dof_index node) const {
+    return static_cast<int>(own_nodes_.index_within_set(node));
   }
 
   // deal.II may have left out points of the file that no cell uses, so corners are found by place.
@@ -149,7 +189,7 @@ private:
     for (std::size_t f = 0; f < result_.faces.size(); ++f)
       if (is_named(corners_[f]))
         faces.push_back(static_cast<int>(f));
-    if (faces.empty())
+    if (result_.ranks.sum(static_cast<double>(faces.size())) == 0)
       result_.boundaries.erase(name); // a set of cells or of inner nodes names no boundary
   }
 
@@ -169,12 +209,12 @@ private:
               "merge duplicate nodes",
               at->second, corner, x.x(), x.y(), x.z());
       }
-    for (const auto &vertex : mesh_->triangulation.get_vertices()) {
+    for (const auto &vertex : mesh_->triangulation->get_vertices()) {
       Vec<3> x = Vec<3>::Zero();
       x.template head<dim>() = to_vec<dim>(vertex);
       point_of_vertex_.push_back(index.at(x));
     }
-    for (const auto &cell : mesh_->triangulation.active_cell_iterators())
+    for (const auto &cell : mesh_->own_cells())
       for (const unsigned int f : cell->face_indices())
         if (cell->face(f)->at_boundary()) {
           std::vector<int> corners;
@@ -191,7 +231,7 @@ private:
       result_.modes_per_cell = modes;
     });
     result_.points_per_cell = static_cast<int>(quadrature().size());
-    result_.nodes.resize(mesh_->nodes.n_dofs());
+    result_.nodes.resize(own_nodes_.n_elements());
   }
 
   // degree + 1 Gauss points per axis: exact for the mass matrix of a parallelepiped.
@@ -207,7 +247,7 @@ private:
                          update_quadrature_points);
     FEValues<dim> centre(mapping_, mesh_->element, QMidpoint<dim>(), update_jacobians);
     std::vector<types::global_dof_index> numbers(mesh_->element.n_dofs_per_cell());
-    for (const auto &cell : mesh_->nodes.active_cell_iterators()) {
+    for (const auto &cell : mesh_->own_cells()) {
       fe.reinit(cell);
       centre.reinit(cell);
       cell->get_dof_indices(numbers);
@@ -224,9 +264,11 @@ private:
   void add_nodes(const Cell &cell, const std::vector<dealii::types::global_dof_index> &numbers) {
     for (unsigned int k = 0; k < numbers.size(); ++k) {
       const auto unit = mesh_->element.unit_support_point(k);
-      result_.nodes[numbers[k]] = to_vec<dim>(mapping_.transform_unit_to_real_cell(
-          typename dealii::Triangulation<dim>::cell_iterator(cell), unit));
-      result_.cell_nodes.push_back(static_cast<int>(numbers[k]));
+      const int node = local(numbers[k]);
+      result_.nodes[static_cast<std::size_t>(node)] =
+          to_vec<dim>(mapping_.transform_unit_to_real_cell(
+              typename dealii::Triangulation<dim>::cell_iterator(cell), unit));
+      result_.cell_nodes.push_back(node);
     }
   }
 
@@ -296,13 +338,15 @@ private:
     FEFaceValues<dim> fe(mapping_, mesh_->element, points,
                          update_values | update_gradients | update_JxW_values |
                              update_normal_vectors | update_quadrature_points);
-    for (const auto &cell : mesh_->nodes.active_cell_iterators())
+    int number = 0;
+    for (const auto &cell : mesh_->own_cells()) {
       for (const unsigned int f : cell->face_indices())
         if (cell->face(f)->at_boundary()) {
           fe.reinit(cell, f);
-          add_face(static_cast<int>(cell->active_cell_index()), f,
-                   static_cast<Side>(cell->face(f)->boundary_id()), fe);
+          add_face(number, f, static_cast<Side>(cell->face(f)->boundary_id()), fe);
         }
+      ++number;
+    }
   }
 
   void add_face(int cell, unsigned int f, Side side, const dealii::FEFaceValues<dim> &fe) {
@@ -344,6 +388,7 @@ private:
 
   dealii::MappingQ1<dim> mapping_;
   std::shared_ptr<DealiiMesh<dim>> mesh_;
+  dealii::IndexSet own_nodes_; // of the body's, those of the cells here
   Discretisation<dim> result_;
   std::vector<int> point_of_vertex_;      // of the file, for every vertex of deal.II
   std::vector<std::vector<int>> corners_; // sorted points of the file, for every boundary face
@@ -385,23 +430,28 @@ template <int dim> int Discretisation<dim>::nearest_node(const Vec<dim> &positio
       std::min_element(nodes.begin(), nodes.end(), [&](const Vec<dim> &a, const Vec<dim> &b) {
         return (a - position).squaredNorm() < (b - position).squaredNorm();
       });
-  return static_cast<int>(nearest - nodes.begin());
+  const double distance = (*nearest - position).squaredNorm();
+  const bool is_nearest = distance == ranks.min(distance);
+  const double lowest = ranks.min(is_nearest ? ranks.rank() : ranks.size());
+  return ranks.rank() == lowest ? static_cast<int>(nearest - nodes.begin()) : -1;
 }
 
-template <int dim> Discretisation<dim> discretise(const Box<dim> &box, ElementKind kind) {
+template <int dim>
+Discretisation<dim> discretise(const Box<dim> &box, ElementKind kind, const Ranks &ranks) {
   check_box(box);
-  return Builder<dim>(box, kind).build(box);
+  return Builder<dim>(box, kind, ranks).build(box);
 }
 
-template <int dim> Discretisation<dim> discretise(const MeshFile &mesh, ElementKind kind) {
-  return Builder<dim>(mesh, kind).build(mesh);
+template <int dim>
+Discretisation<dim> discretise(const MeshFile &mesh, ElementKind kind, const Ranks &ranks) {
+  return Builder<dim>(mesh, kind, ranks).build(mesh);
 }
 
 template struct Discretisation<2>;
 template struct Discretisation<3>;
-template Discretisation<2> discretise(const Box<2> &, ElementKind);
-template Discretisation<3> discretise(const Box<3> &, ElementKind);
-template Discretisation<2> discretise<2>(const MeshFile &, ElementKind);
-template Discretisation<3> discretise<3>(const MeshFile &, ElementKind);
+template Discretisation<2> discretise(const Box<2> &, ElementKind, const Ranks &);
+template Discretisation<3> discretise(const Box<3> &, ElementKind, const Ranks &);
+template Discretisation<2> discretise<2>(const MeshFile &, ElementKind, const Ranks &);
+template Discretisation<3> discretise<3>(const MeshFile &, ElementKind, const Ranks &);
 
 } // namespace sluice::solid

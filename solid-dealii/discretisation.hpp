@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: MIT
 // From a box or a mesh file of quadrilaterals or hexahedra to what the kernels need: node
 // positions, cells, and the gradients of shape functions and incompatible modes in the reference
-// configuration, computed once. deal.II makes the mesh, numbers the nodes and integrates; its
-// headers stay behind this one.
+// configuration, computed once. deal.II makes the mesh, cuts it where there are several ranks,
+// numbers the nodes and integrates; its headers stay behind this one.
 #pragma once
 
 #include "solid-dealii/element.hpp"
 #include "solid-dealii/mesh_file.hpp"
+#include "solid-dealii/shared_entries.hpp"
 
 #include <array>
 #include <functional>
@@ -52,6 +53,7 @@ template <int dim> struct BoundaryPoint {
 /// deal.II's triangulation and degrees of freedom; defined in dealii_mesh.hpp.
 template <int dim> struct DealiiMesh;
 
+/// Of the whole body, or of the part that this rank holds: its cells with all their nodes.
 template <int dim> struct Discretisation {
   ElementKind kind = ElementKind::incompatible_modes;
   int degree = 1;
@@ -69,27 +71,39 @@ template <int dim> struct Discretisation {
   int points_per_face = 0;
   std::map<std::string, std::vector<int>> boundaries; ///< faces of every named part of the boundary
   std::shared_ptr<const DealiiMesh<dim>> mesh;
+  Ranks ranks;                      ///< that share the body
+  std::vector<double> node_numbers; ///< of the nodes here among all of the body, ascending
+  SharedEntries components;         ///< of vectors with dim entries per node
 
   int n_cells() const { return static_cast<int>(cell_nodes.size()) / nodes_per_cell; }
   int n_nodes() const { return static_cast<int>(nodes.size()); }
   int n_dofs() const { return dim * n_nodes(); }
   int n_modes() const { return dim * modes_per_cell * n_cells(); }
   int columns() const { return nodes_per_cell + modes_per_cell; }
+  /// Cells on all ranks.
+  long n_cells_of_all() const { return std::lround(ranks.sum(n_cells())); }
   /// Nodes of one side, each once, in ascending number.
   std::vector<int> side_nodes(Side side) const { return nodes_of(boundary(name_of(side))); }
   /// Faces of a named part of the boundary. Throws UserError that lists the names there are.
   const std::vector<int> &boundary(const std::string &name) const;
   /// Nodes of some faces, each once, in ascending number.
   std::vector<int> nodes_of(const std::vector<int> &some_faces) const;
-  /// The node nearest to a position [m].
+  /// The node nearest to a position [m]: its number on one of the ranks that hold it, -1 on others.
   int nearest_node(const Vec<dim> &position) const;
+  /// A nodal field at such a node, the same on every rank.
+  Vec<dim> at(const Eigen::VectorXd &field, int node) const {
+    return ranks.sum(node < 0 ? Vec<dim>(Vec<dim>::Zero())
+                              : Vec<dim>(field.template segment<dim>(dim * node)));
+  }
 };
 
 /// Throws UserError for a box without extent or cells, or whose cells are inverted by `shape`.
-template <int dim> Discretisation<dim> discretise(const Box<dim> &box, ElementKind kind);
+template <int dim>
+Discretisation<dim> discretise(const Box<dim> &box, ElementKind kind, const Ranks &ranks = {});
 
 /// The same for a mesh from a file, whose cells may be numbered in either sense. Throws UserError
 /// for cells without volume, and for a named part of the boundary that has no face.
-template <int dim> Discretisation<dim> discretise(const MeshFile &mesh, ElementKind kind);
+template <int dim>
+Discretisation<dim> discretise(const MeshFile &mesh, ElementKind kind, const Ranks &ranks = {});
 
 } // namespace sluice::solid

@@ -30,15 +30,19 @@ template <int dim>
 History<dim>::History(const SolidSolver<dim> &solver, std::filesystem::path folder,
                       double output_interval, const SolidState *first, double time)
     : solver_(solver), folder_(std::move(folder)), output_interval_(output_interval),
-      loads_(folder_ / "solid_loads.csv",
+      loads_(solver.ranks(), folder_ / "solid_loads.csv",
              "window,time_s,fx_n,fy_n,moment_nm,magnitude_n,moment_magnitude_nm,work_j,"
              "work_magnitude_j"),
-      energy_(folder_ / "solid_energy.csv", "time_s,kinetic_j,strain_j,load_work_j"),
-      reactions_(folder_ / "reactions.csv", "time_s,fx_n,fy_n,fz_n,moment_z_nm") {
+      energy_(solver.ranks(), folder_ / "solid_energy.csv",
+              "time_s,kinetic_j,strain_j,load_work_j"),
+      reactions_(solver.ranks(), folder_ / "reactions.csv", "time_s,fx_n,fy_n,fz_n,moment_z_nm") {
   const auto &d = solver.discretisation();
+  n_elements_ = d.n_cells_of_all(); // with all ranks here: a summary may be one rank's last word
+  n_unknowns_ = solver.assembly().n_free_of_all();
   if (solver.params().mesh.empty()) {
     end_ = free_end(d, solver.clamped_side());
-    tip_.emplace(folder_ / "tip.csv", "time_s,ux_m,uy_m,ux_front_m,uy_front_m,ux_back_m,uy_back_m");
+    tip_ = Series(d.ranks, folder_ / "tip.csv",
+                  "time_s,ux_m,uy_m,ux_front_m,uy_front_m,ux_back_m,uy_back_m");
   }
   std::string header = "time_s";
   for (const auto &probe : solver.params().probes) {
@@ -47,7 +51,7 @@ History<dim>::History(const SolidSolver<dim> &solver, std::filesystem::path fold
       header += fmt::format(",{}_u{}_m", probe.name, "xyz"[c]);
   }
   if (!probe_nodes_.empty())
-    probes_.emplace(folder_ / "probes.csv", header);
+    probes_ = Series(d.ranks, folder_ / "probes.csv", header);
   if (output_interval > 0)
     fields_.emplace(d, folder_);
   fields_written_ = first && output_interval > 0 ? std::lround(time / output_interval) : 0;
@@ -95,19 +99,19 @@ template <int dim> void History<dim>::record_tip(const SolidState &state, double
   const auto &u = state.displacement;
   const Vec<dim> front = end_->at(u, end_->front), back = end_->at(u, end_->back);
   last_tip_ = end_->middle(u);
-  tip_->row({time, last_tip_.x(), last_tip_.y(), front.x(), front.y(), back.x(), back.y()});
+  tip_.row({time, last_tip_.x(), last_tip_.y(), front.x(), front.y(), back.x(), back.y()});
 }
 
 template <int dim> void History<dim>::record_probes(const SolidState &state, double time) {
-  if (!probes_)
+  if (probe_nodes_.empty())
     return;
   std::vector<double> row{time};
   for (const int node : probe_nodes_) {
-    const Vec<dim> u = state.displacement.template segment<dim>(dim * node);
+    const Vec<dim> u = solver_.discretisation().at(state.displacement, node);
     row.insert(row.end(), u.begin(), u.end());
   }
-  probes_->row(row);
-  last_tip_ = state.displacement.template segment<dim>(dim * probe_nodes_.front());
+  probes_.row(row);
+  std::copy_n(row.begin() + 1, dim, last_tip_.begin());
 }
 
 template <int dim> void History<dim>::write_fields(const SolidState &state, double time) {
@@ -116,7 +120,7 @@ template <int dim> void History<dim>::write_fields(const SolidState &state, doub
   const auto energy = solver_.assembly().energy_of_cells(state.displacement, state.modes);
   fields_->write(time, {state.displacement, state.velocity, pressure_of(stress),
                         von_mises_of(stress), stress, energy});
-  write_state(folder_ / "solid_state.h5", {state, time});
+  write_state(state_file(folder_ / "solid_state.h5", solver_.ranks()), {state, time});
   fields_written_ = std::lround(std::floor(time / output_interval_ * (1 + 1e-9))) + 1;
   output_seconds_ += watch.seconds();
 }
@@ -127,6 +131,8 @@ template <int dim> std::string History<dim>::note() const {
 
 template <int dim>
 void History<dim>::write_summary(std::string_view message, const nlohmann::json &extra) const {
+  if (!solver_.ranks().is_root())
+    return;
   const auto &counts = solver_.counts();
   const double windows = static_cast<double>(std::max(1L, windows_));
   const auto mean = static_cast<double>(counts.iterations) /
@@ -148,8 +154,9 @@ void History<dim>::write_summary(std::string_view message, const nlohmann::json 
       {"solid_cut_steps", counts.cut_steps},
       {"solid_factorisations", counts.factorisations},
       {"solid_linear_iterations", counts.linear_iterations},
-      {"solid_elements", solver_.discretisation().n_cells()},
-      {"solid_unknowns", solver_.assembly().n_free()},
+      {"solid_elements", n_elements_},
+      {"solid_unknowns", n_unknowns_},
+      {"solid_ranks", solver_.ranks().size()},
       {"solid_element", solver_.params().used_element()},
       {"solid_material", solver_.params().material},
       {"solid_dimension", dim}};

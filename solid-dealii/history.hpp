@@ -23,6 +23,24 @@
 
 namespace sluice::solid {
 
+/// A series that the root writes; elsewhere, and without a file, nothing.
+class Series {
+public:
+  Series() = default;
+  Series(const Ranks &ranks, const std::filesystem::path &file, const std::string &header) {
+    if (ranks.is_root())
+      writer_.emplace(file, header);
+  }
+  void row(std::initializer_list<double> values) { row(std::span(values.begin(), values.size())); }
+  void row(std::span<const double> values) {
+    if (writer_)
+      writer_->row(values);
+  }
+
+private:
+  std::optional<CsvWriter> writer_;
+};
+
 template <int dim> class History {
 public:
   /// Fields are written every `output_interval` [s]; 0: none. Writes the state at rest at once, or
@@ -51,9 +69,9 @@ private:
   double output_interval_;
   std::optional<FreeEnd<dim>> end_; // of a box
   std::vector<int> probe_nodes_;
-  std::optional<CsvWriter> tip_, probes_;
-  CsvWriter loads_, energy_, reactions_;
+  Series tip_, probes_, loads_, energy_, reactions_;
   std::optional<OutputVtk<dim>> fields_;
+  long n_elements_ = 0, n_unknowns_ = 0; // of the body
   long fields_written_ = 0;
   long windows_ = 0;
   double output_seconds_ = 0;

@@ -98,7 +98,7 @@ bool outward_order(const Vec<3> &a, const Vec<3> &b, const Vec<3> &c) {
 
 template <int dim>
 Interface<dim> wetted_interface(const Discretisation<dim> &d, const std::vector<int> &wetted) {
-  check(!wetted.empty(),
+  check(d.ranks.sum(static_cast<double>(wetted.size())) > 0,
         "solid: no part of the boundary is wetted; give one [[solid.boundary]] the "
         "kind wetted");
   std::vector<Facet> facets;
@@ -234,18 +234,37 @@ template <int dim> FreeEnd<dim> free_end(const Discretisation<dim> &d, Side clam
     const auto near = d.side_nodes(Side::near);
     std::erase_if(nodes, [&](int n) { return !std::binary_search(near.begin(), near.end(), n); });
   }
-  std::sort(nodes.begin(), nodes.end(),
-            [&](int a, int b) { return position(a)[along] < position(b)[along]; });
+  std::vector<double> mine; // number in the body and place along the end
+  for (const int node : nodes)
+    mine.insert(mine.end(),
+                {d.node_numbers[static_cast<std::size_t>(node)], position(node)[along]});
+  struct EndNode {
+    double along;
+    int node;
+  };
+  std::map<double, EndNode> by_number;
+  const auto of_ranks = d.ranks.gather_everywhere(mine);
+  for (std::size_t r = 0; r < of_ranks.size(); ++r)
+    for (std::size_t k = 0; 2 * k < of_ranks[r].size(); ++k)
+      by_number.try_emplace(
+          of_ranks[r][2 * k],
+          EndNode{of_ranks[r][2 * k + 1], static_cast<int>(r) == d.ranks.rank() ? nodes[k] : -1});
+  std::vector<EndNode> line;
+  for (const auto &[number, node] : by_number)
+    line.push_back(node);
+  std::sort(line.begin(), line.end(),
+            [](const EndNode &a, const EndNode &b) { return a.along < b.along; });
   FreeEnd<dim> end;
-  end.front = nodes.front();
-  end.back = nodes.back();
-  const double middle = 0.5 * (position(end.front)[along] + position(end.back)[along]);
-  const auto after = std::find_if(nodes.begin() + 1, nodes.end() - 1,
-                                  [&](int n) { return position(n)[along] >= middle; });
-  end.after_middle = *after;
-  end.before_middle = *(after - 1);
-  const double from = position(end.before_middle)[along], to = position(end.after_middle)[along];
-  end.weight_after = (middle - from) / (to - from);
+  end.ranks = d.ranks;
+  end.front = line.front().node;
+  end.back = line.back().node;
+  const double middle = 0.5 * (line.front().along + line.back().along);
+  const auto after = std::find_if(line.begin() + 1, line.end() - 1,
+                                  [&](const EndNode &n) { return n.along >= middle; });
+  const auto before = after - 1;
+  end.after_middle = after->node;
+  end.before_middle = before->node;
+  end.weight_after = (middle - before->along) / (after->along - before->along);
   return end;
 }
 

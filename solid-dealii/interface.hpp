@@ -49,13 +49,16 @@ Interface<3> plane_interface(const Discretisation<3> &discretisation,
 
 /// The free end, opposite to the clamped side: its two corners and its middle. `front` is the
 /// corner of smaller x (of smaller y on a vertical end); in three dimensions in the near plane.
+/// On several ranks a node is -1 on all but one; its displacement is the same on all.
 template <int dim> struct FreeEnd {
   int front = 0, back = 0;                 ///< nodes
   int before_middle = 0, after_middle = 0; ///< the nodes on both sides of the middle
   double weight_after = 0;                 ///< of the latter in linear interpolation
+  Ranks ranks;
 
   Vec<dim> at(const Eigen::VectorXd &field, int node) const {
-    return field.template segment<dim>(dim * node);
+    return ranks.sum(node < 0 ? Vec<dim>(Vec<dim>::Zero())
+                              : Vec<dim>(field.template segment<dim>(dim * node)));
   }
   Vec<dim> middle(const Eigen::VectorXd &field) const {
     return (1 - weight_after) * at(field, before_middle) + weight_after * at(field, after_middle);

@@ -4,8 +4,12 @@
 //
 // The multigrid keeps the rigid motions of the body, and its set-up is used again for later
 // matrices until conjugate gradients need half as many iterations more than with a fresh one.
-// Source: P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179.
+// Source: P. Vanek, J. Mandel, M. Brezina, Computing 56 (1996) 179. A matrix that conjugate
+// gradients find not to be positive definite is solved by MINRES, as the direct solver would solve
+// it.
 #pragma once
+
+#include "solid-dealii/shared_entries.hpp"
 
 #include <Eigen/Sparse>
 
@@ -23,11 +27,14 @@ LinearSolverKind linear_solver_kind(std::string_view name);
 
 /// What a multigrid has to know of a body: unknowns in blocks of one node each, with places left
 /// for components that are fixed, and the motions that cost no energy, one a column, zero at such
-/// places.
+/// places. On several ranks the places of each rank follow those of the ranks before.
 struct RigidMotions {
   int block = 0;           ///< components per node
-  std::vector<int> place;  ///< of every unknown among the blocks
-  Eigen::MatrixXd vectors; ///< as many rows as there are places
+  std::vector<int> place;  ///< of every unknown held here among the blocks of the body
+  int first = 0;           ///< place of the first block that this rank owns
+  Eigen::MatrixXd vectors; ///< as many rows as this rank owns places
+  Ranks ranks;
+  SharedEntries unknowns;
 };
 
 class LinearSolver {
@@ -39,7 +46,8 @@ public:
   static constexpr double cg_tolerance = 1e-8;
 
   /// `pattern` gives the sparsity of every matrix to come. `motions` is asked once, and only by
-  /// the multigrid.
+  /// the multigrid; on several ranks matrices are those of the cells of each, and it is the only
+  /// one.
   explicit LinearSolver(const Eigen::SparseMatrix<double> &pattern,
                         LinearSolverKind kind = LinearSolverKind::direct,
                         const std::function<RigidMotions()> &motions = {});
@@ -48,10 +56,10 @@ public:
 
   /// False when the matrix is singular to working precision.
   bool factorise(const Eigen::SparseMatrix<double> &matrix);
-  /// Solves with the last matrix factorised, which must still exist. Not finite where conjugate
-  /// gradients do not converge.
+  /// Solves with the last matrix factorised, which must still exist. Not finite where the iteration
+  /// does not converge.
   Eigen::VectorXd solve(const Eigen::VectorXd &right);
-  int last_iterations() const; ///< of conjugate gradients; 0 for the direct solver
+  int last_iterations() const; ///< of conjugate gradients or MINRES; 0 for the direct solver
   int set_ups() const;         ///< of the multigrid since the start
 
   /// What one kind of solver does.

@@ -51,6 +51,7 @@ Eigen::VectorXd pressure_forces(const Discretisation<dim> &d, const std::vector<
     for (int a = 0; a < d.nodes_per_cell; ++a)
       forces.template segment<dim>(dim * nodes[a]) += point.values[a] * traction;
   });
+  d.components.add_up(forces);
   return forces;
 }
 
@@ -63,6 +64,7 @@ Eigen::VectorXd traction_forces(const Discretisation<dim> &d, const std::vector<
     for (int a = 0; a < d.nodes_per_cell; ++a)
       forces.template segment<dim>(dim * nodes[a]) += point.values[a] * force;
   });
+  d.components.add_up(forces);
   return forces;
 }
 
@@ -71,6 +73,8 @@ LoadSums<dim> sum_loads(const Discretisation<dim> &d, const Eigen::VectorXd &loa
                         const Eigen::VectorXd &start, const Eigen::VectorXd &end) {
   LoadSums<dim> sums;
   for (int a = 0; a < d.n_nodes(); ++a) {
+    if (!d.components.owns(dim * a))
+      continue;
     const Vec<dim> f = load.template segment<dim>(dim * a);
     const Vec<dim> u = end.template segment<dim>(dim * a);
     const Vec<dim> x = d.nodes[static_cast<std::size_t>(a)] + u;
@@ -82,6 +86,11 @@ LoadSums<dim> sum_loads(const Discretisation<dim> &d, const Eigen::VectorXd &loa
     sums.moment_magnitude += x.norm() * f.norm();
     sums.work_magnitude += std::abs(work);
   }
+  sums.force = d.ranks.sum(sums.force);
+  sums.moment = d.ranks.sum(sums.moment);
+  for (double *sum :
+       {&sums.work, &sums.force_magnitude, &sums.moment_magnitude, &sums.work_magnitude})
+    *sum = d.ranks.sum(*sum);
   return sums;
 }
 

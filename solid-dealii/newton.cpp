@@ -20,18 +20,18 @@ typename Newton<dim>::Residual Newton<dim>::evaluate(const Equation &equation,
   if (!(r.min_det > 0))
     return r;
   r.force = equation.internal_factor * assembly_.condensed_force() - equation.load;
-  r.reference = std::max(assembly_.restrict_to_free(equation.load).norm(),
-                         assembly_.restrict_to_free(assembly_.condensed_force()).norm());
+  r.reference = std::max(assembly_.norm_of_free(equation.load),
+                         assembly_.norm_of_free(assembly_.condensed_force()));
   if (equation.mass_factor > 0) {
     const Eigen::VectorXd inertia =
         equation.mass_factor *
         assembly_.mass_times(iterate.displacement - equation.inertial_reference);
     r.force += inertia;
-    r.reference = std::max(r.reference, assembly_.restrict_to_free(inertia).norm());
+    r.reference = std::max(r.reference, assembly_.norm_of_free(inertia));
   }
   r.round_off = assembly_.round_off_force(equation.internal_factor * (1 + overstress_.factor),
                                           equation.mass_factor, iterate.displacement);
-  r.norm = std::hypot(assembly_.restrict_to_free(r.force).norm(), assembly_.mode_residual());
+  r.norm = std::hypot(assembly_.norm_of_free(r.force), assembly_.mode_residual());
   return r;
 }
 

@@ -14,30 +14,33 @@ namespace sluice::solid {
 
 template <int dim> struct OutputVtk<dim>::Impl {
   Impl(const Discretisation<dim> &d, std::filesystem::path into)
-      : mesh(d.mesh), folder(std::move(into)), degree(static_cast<unsigned int>(d.degree)),
-        element(mesh->element, dim), vectors(mesh->triangulation) {
+      : mesh(d.mesh), ranks(d.ranks), folder(std::move(into)),
+        degree(static_cast<unsigned int>(d.degree)), element(mesh->element, dim),
+        vectors(*mesh->triangulation) {
     vectors.distribute_dofs(element);
-    number_components();
+    number_components(d);
   }
 
   // position_of[dim * node + component] is the place in deal.II's numbering of the vector field.
-  void number_components() {
-    using namespace dealii;
-    position_of.resize(vectors.n_dofs());
-    std::vector<types::global_dof_index> scalar(mesh->element.n_dofs_per_cell());
-    std::vector<types::global_dof_index> vector(element.n_dofs_per_cell());
-    for (const auto &cell : vectors.active_cell_iterators()) {
+  void number_components(const Discretisation<dim> &d) {
+    position_of.resize(static_cast<std::size_t>(d.n_dofs()));
+    std::vector<dealii::types::global_dof_index> vector(element.n_dofs_per_cell());
+    auto nodes = d.cell_nodes.begin();
+    for (const auto &cell : own_cells()) {
       cell->get_dof_indices(vector);
-      typename DoFHandler<dim>::active_cell_iterator(&mesh->triangulation, cell->level(),
-                                                     cell->index(), &mesh->nodes)
-          ->get_dof_indices(scalar);
       for (unsigned int k = 0; k < vector.size(); ++k) {
         const auto [component, node] = element.system_to_component_index(k);
-        position_of[dim * scalar[node] + component] = vector[k];
+        position_of[static_cast<std::size_t>(dim * nodes[node]) + component] = vector[k];
       }
+      nodes += d.nodes_per_cell;
     }
   }
 
+  auto own_cells() const {
+    return vectors.active_cell_iterators() | dealii::IteratorFilters::LocallyOwnedCell();
+  }
+
+  // Of the whole body's length: only entries of own cells are read.
   dealii::Vector<double> nodal(const Eigen::VectorXd &field) const {
     dealii::Vector<double> numbered(vectors.n_dofs());
     for (std::size_t k = 0; k < position_of.size(); ++k)
@@ -45,11 +48,22 @@ template <int dim> struct OutputVtk<dim>::Impl {
     return numbered;
   }
 
-  static dealii::Vector<double> cellwise(const Eigen::VectorXd &field) {
-    return dealii::Vector<double>(field.data(), field.data() + field.size());
+  dealii::Vector<double> cellwise(const Eigen::VectorXd &field) const {
+    dealii::Vector<double> all(mesh->triangulation->n_active_cells());
+    Eigen::Index k = 0;
+    for (const auto &cell : own_cells())
+      all[cell->active_cell_index()] = field[k++];
+    return all;
   }
 
-  void write_fields(std::ostream &out, const OutputFields &fields) const {
+  // The number of the sample, as all files of it begin.
+  std::string stem() const { return fmt::format("solid_{:04}", written.size()); }
+
+  std::string part_of(int rank) const {
+    return ranks.is_one() ? stem() + ".vtu" : fmt::format("{}.{}.vtu", stem(), rank + 1);
+  }
+
+  void write_fields(const OutputFields &fields) const {
     using namespace dealii;
     const auto displacement = nodal(fields.displacement), velocity = nodal(fields.velocity);
     const auto pressure = cellwise(fields.pressure), von_mises = cellwise(fields.von_mises);
@@ -72,11 +86,26 @@ template <int dim> struct OutputVtk<dim>::Impl {
                            DataOut<dim>::type_cell_data);
     data.build_patches(MappingQEulerian<dim>(degree, vectors, displacement), degree,
                        DataOut<dim>::curved_inner_cells);
-    data.write_vtu(out);
+    to_file(part_of(ranks.rank()), [&](std::ostream &out) { data.write_vtu(out); });
+    if (ranks.is_one() || !ranks.is_root())
+      return;
+    std::vector<std::string> parts;
+    for (int rank = 0; rank < ranks.size(); ++rank)
+      parts.push_back(part_of(rank));
+    to_file(stem() + ".pvtu", [&](std::ostream &out) { data.write_pvtu_record(out, parts); });
+  }
+
+  template <class Write> void to_file(const std::string &name, Write &&write) const {
+    std::ofstream out(folder / name);
+    write(out);
+    out.flush(); // or a full disk shows in the destructor, where nobody asks
+    check(out.good(), "{}: writing failed; is the disk full?", (folder / name).string());
   }
 
   // Renamed when it is whole: a reader, or a run that ends here, never meets half an index.
   void write_index() const {
+    if (!ranks.is_root())
+      return;
     const auto part = folder / "solid.pvd.part", whole = folder / "solid.pvd";
     std::ofstream index(part);
     dealii::DataOutBase::write_pvd_record(index, written);
@@ -86,6 +115,7 @@ template <int dim> struct OutputVtk<dim>::Impl {
   }
 
   std::shared_ptr<const DealiiMesh<dim>> mesh;
+  Ranks ranks;
   std::filesystem::path folder;
   unsigned int degree;
   dealii::FESystem<dim> element;
@@ -101,12 +131,8 @@ OutputVtk<dim>::OutputVtk(const Discretisation<dim> &discretisation, std::filesy
 template <int dim> OutputVtk<dim>::~OutputVtk() = default;
 
 template <int dim> void OutputVtk<dim>::write(double time, const OutputFields &fields) {
-  const std::string name = fmt::format("solid_{:04}.vtu", impl_->written.size());
-  std::ofstream out(impl_->folder / name);
-  impl_->write_fields(out, fields);
-  out.flush(); // or a full disk shows in the destructor, where nobody asks
-  check(out.good(), "{}: writing failed; is the disk full?", (impl_->folder / name).string());
-  impl_->written.emplace_back(time, name);
+  impl_->write_fields(fields);
+  impl_->written.emplace_back(time, impl_->stem() + (impl_->ranks.is_one() ? ".vtu" : ".pvtu"));
   impl_->write_index();
 }
 

@@ -29,7 +29,7 @@ public:
   OutputVtk &operator=(const OutputVtk &) = delete;
 
   /// Writes solid_NNNN.vtu for `time` [s] and renews solid.pvd, so that a run which is cut short
-  /// leaves a readable series.
+  /// leaves a readable series. On several ranks each writes a part, which solid_NNNN.pvtu joins.
   void write(double time, const OutputFields &fields);
 
 private:

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// sluice-solid CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--check] [--alone TASK]
+// [mpirun -n N] sluice-solid CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--check]
+//                                      [--alone TASK]
 #include "solid-dealii/alone.hpp"
 #include "solid-dealii/coupling.hpp"
 #include "solid-dealii/solid_solver.hpp"
@@ -16,25 +17,29 @@ struct Options {
   bool check_only = false;
 };
 
-template <int dim> void print_check(const sluice::solid::SolidParams &params) {
-  const sluice::solid::SolidSolver<dim> solver(params);
-  fmt::print("solid: {} {} elements, {} unknowns\n", solver.discretisation().n_cells(),
-             params.used_element(), solver.assembly().n_free());
+template <int dim>
+void print_check(const sluice::solid::SolidParams &params, const sluice::solid::Ranks &ranks) {
+  const sluice::solid::SolidSolver<dim> solver(params, ranks);
+  const auto elements = solver.discretisation().n_cells_of_all(),
+             unknowns = solver.assembly().n_free_of_all();
+  if (ranks.is_root())
+    fmt::print("solid: {} {} elements, {} unknowns\n", elements, params.used_element(), unknowns);
 }
 
-void run(const Options &options) {
+void run(const Options &options, const sluice::solid::Ranks &ranks) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
   config.allow_tables({"case", "parameters", "bridge", "fluid", "fluid.rheology", "fluid.wall",
                        "fluid.gauge", "fluid.probe", "solid", "solid.boundary", "solid.probe"});
   if (options.check_only) {
     const auto params = solid::read_params(config);
-    return params.dimension == 2 ? print_check<2>(params) : print_check<3>(params);
+    return params.dimension == 2 ? print_check<2>(params, ranks) : print_check<3>(params, ranks);
   }
   if (!options.task.empty())
-    return solid::run_alone(options.task, config, options.water, options.out, options.restart);
+    return solid::run_alone(options.task, config, options.water, options.out, options.restart,
+                            ranks);
   std::filesystem::create_directories(options.out);
-  solid::run(config, options.out);
+  solid::run(config, options.out, ranks);
 }
 
 } // namespace
@@ -53,10 +58,12 @@ int main(int argc, char **argv) {
                  "with --alone release: go on from this solid_state.h5");
   app.add_option("--water-level", options.water.level, "[m] of that water")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
+  const auto ranks = sluice::solid::Ranks::of_launch();
   try {
-    run(options);
+    run(options, ranks);
   } catch (const std::exception &error) {
     fmt::print(stderr, "sluice-solid: {}\n", error.what());
+    ranks.abort();
     return 1;
   }
   return 0;

@@ -22,10 +22,10 @@ template <int dim> Box<dim> box_of(const SolidParams &p) {
             {}};
 }
 
-template <int dim> Discretisation<dim> discretise(const SolidParams &p) {
+template <int dim> Discretisation<dim> discretise(const SolidParams &p, const Ranks &ranks) {
   const ElementKind kind = element_kind(p.used_element());
-  return p.mesh.empty() ? discretise(box_of<dim>(p), kind)
-                        : discretise<dim>(read_mesh(p.mesh, dim), kind);
+  return p.mesh.empty() ? discretise(box_of<dim>(p), kind, ranks)
+                        : discretise<dim>(read_mesh(p.mesh, dim), kind, ranks);
 }
 
 Material material_of(const SolidParams &p) {
@@ -48,15 +48,25 @@ Side side_named(std::string_view name) {
 Side opposite(Side side) { return static_cast<Side>(static_cast<int>(side) ^ 1); }
 
 template <int dim>
-SolidSolver<dim>::SolidSolver(const SolidParams &params)
-    : params_(params), discretisation_(discretise<dim>(params)),
+SolidSolver<dim>::SolidSolver(const SolidParams &params, const Ranks &ranks)
+    : params_(params), discretisation_(discretise<dim>(params, ranks)),
       supports_(supports_of(discretisation_, params)),
       own_load_(sluice::solid::own_load(discretisation_, params)),
       assembly_(discretisation_, material_of(params), params.density, supports_.fixed),
       newton_(assembly_,
               {params.newton_tolerance, params.newton_max_iterations, params.tangent_reuse},
-              linear_solver_kind(params.linear_solver)),
+              linear_solver()),
       integrator_(params.spectral_radius) {}
+
+template <int dim> LinearSolverKind SolidSolver<dim>::linear_solver() const {
+  const auto kind = linear_solver_kind(params_.linear_solver);
+  if (discretisation_.ranks.is_one())
+    return kind;
+  check(kind != LinearSolverKind::direct,
+        "solid: linear_solver = \"direct\" works on one rank, not on {}; take cg",
+        discretisation_.ranks.size());
+  return LinearSolverKind::cg;
+}
 
 template <int dim> SolidState SolidSolver<dim>::initial_state() const {
   const auto &d = discretisation_;
@@ -85,7 +95,8 @@ NewtonReport SolidSolver<dim>::solve(const Equation &equation, Iterate &iterate,
 template <int dim>
 SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd &load, double dt,
                                   const SolidState *guess) {
-  check(load.allFinite(), "solid: a nodal force is not finite in step {}", start.step + 1);
+  check(discretisation_.ranks.min(load.allFinite() ? 1 : 0) > 0,
+        "solid: a nodal force is not finite in step {}", start.step + 1);
   const Stopwatch watch;
   const double cpu_start = process_cpu_time();
   const Viscosity &viscosity = params_.viscosity;
@@ -112,7 +123,7 @@ SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd
     if (!report.has_converged)
       continue;
     SolidState end = integrator_.finish(start, iterate, dt);
-    end.load_work += total.dot(end.displacement - start.displacement);
+    end.load_work += discretisation_.components.dot(total, end.displacement - start.displacement);
     if (viscous)
       end.branch = viscous->branch_at_end(assembly_.relaxing_stresses(end.displacement, end.modes));
     counts_.seconds += watch.seconds();
@@ -122,7 +133,7 @@ SolidState SolidSolver<dim>::step(const SolidState &start, const Eigen::VectorXd
   throw NoSolution(fmt::format(
       "solid: step {} of {:.3g} s has no solution: {}; the largest nodal force is {:.3g} N. "
       "Take a smaller case.time_step_s, or look at the loads",
-      start.step + 1, dt, report.failure, load.size() ? load.cwiseAbs().maxCoeff() : 0.0));
+      start.step + 1, dt, report.failure, discretisation_.ranks.max(load.cwiseAbs().maxCoeff())));
 }
 
 template <int dim>
@@ -167,7 +178,7 @@ void SolidSolver<dim>::raise_load(const Eigen::VectorXd &load, Iterate &iterate)
       if (part <= 1e-4)
         throw NoSolution(fmt::format(
             "solid: no equilibrium beyond {:.4g} of the load (largest nodal force {:.3g} N): {}",
-            reached, load.cwiseAbs().maxCoeff(), report.failure));
+            reached, discretisation_.ranks.max(load.cwiseAbs().maxCoeff()), report.failure));
     }
   }
 }
@@ -192,9 +203,9 @@ SolidState SolidSolver<dim>::solve_static_follower(
   for (int round = 0; round < max_rounds; ++round) {
     state = solve_static(load);
     const Eigen::VectorXd next = load_at(state.displacement);
-    const double change = (next - load).norm();
+    const double change = discretisation_.components.norm(next - load);
     load = next;
-    if (change <= 1e-10 * load.norm())
+    if (change <= 1e-10 * discretisation_.components.norm(load))
       return state;
   }
   throw NoSolution(fmt::format("solid: the follower load did not settle in {} rounds", max_rounds));
@@ -218,7 +229,7 @@ Eigen::VectorXd SolidSolver<dim>::reactions(const SolidState &state,
 template <int dim>
 Eigen::VectorXd SolidSolver<dim>::consistent_acceleration(const SolidState &state,
                                                           const Eigen::VectorXd &load) {
-  LinearSolver mass(assembly_.mass(), linear_solver_kind(params_.linear_solver),
+  LinearSolver mass(assembly_.mass(), linear_solver(),
                     [this] { return assembly_.rigid_motions(); });
   mass.factorise(assembly_.mass());
   Eigen::VectorXd acceleration = Eigen::VectorXd::Zero(load.size());
@@ -231,6 +242,8 @@ Eigen::VectorXd SolidSolver<dim>::consistent_acceleration(const SolidState &stat
 
 template <int dim>
 std::vector<double> SolidSolver<dim>::frequencies(const SolidState &state, int count) {
+  check(discretisation_.ranks.is_one(), "solid: frequencies are found on one rank, not on {}",
+        discretisation_.ranks.size());
   check(assembly_.n_free() <= 4000,
         "solid: {} unknowns are too many for the dense eigenvalue problem; use at most 4000",
         assembly_.n_free());
@@ -246,7 +259,7 @@ std::vector<double> SolidSolver<dim>::frequencies(const SolidState &state, int c
 }
 
 template <int dim> double SolidSolver<dim>::kinetic_energy(const SolidState &state) const {
-  return 0.5 * state.velocity.dot(assembly_.mass_times(state.velocity));
+  return 0.5 * discretisation_.components.dot(state.velocity, assembly_.mass_times(state.velocity));
 }
 
 template <int dim> double SolidSolver<dim>::strain_energy(const SolidState &state) const {

@@ -31,7 +31,9 @@ Side opposite(Side side);
 
 template <int dim> class SolidSolver {
 public:
-  explicit SolidSolver(const SolidParams &params);
+  /// On several ranks each holds a part of the body, its states and loads are of that part, and all
+  /// ranks make every call together.
+  explicit SolidSolver(const SolidParams &params, const Ranks &ranks = {});
   SolidSolver(const SolidSolver &) = delete;
   SolidSolver &operator=(const SolidSolver &) = delete;
 
@@ -66,6 +68,7 @@ public:
   /// motion satisfies its equation. `load` as in the step that led to `state`.
   Eigen::VectorXd reactions(const SolidState &state, const Eigen::VectorXd &load) const;
 
+  const Ranks &ranks() const { return discretisation_.ranks; }
   const Discretisation<dim> &discretisation() const { return discretisation_; }
   const Assembly<dim> &assembly() const { return assembly_; }
   const SolidParams &params() const { return params_; }
@@ -75,6 +78,7 @@ public:
   const SolverCounts &counts() const { return counts_; }
 
 private:
+  LinearSolverKind linear_solver() const;
   NewtonReport solve(const Equation &equation, Iterate &iterate,
                      const Overstress<dim> &overstress = {});
   void raise_load(const Eigen::VectorXd &load, Iterate &iterate);

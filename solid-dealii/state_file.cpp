@@ -79,6 +79,14 @@ void write_to(const std::filesystem::path &path, const SavedState &saved) {
 
 } // namespace
 
+std::filesystem::path state_file(const std::filesystem::path &whole, const Ranks &ranks) {
+  if (ranks.is_one())
+    return whole;
+  auto part = whole;
+  return part.replace_extension(
+      fmt::format("{}of{}{}", ranks.rank() + 1, ranks.size(), whole.extension().string()));
+}
+
 void write_state(const std::filesystem::path &file, const SavedState &saved) {
   const Quiet quiet;
   const std::filesystem::path part = file.string() + ".part";

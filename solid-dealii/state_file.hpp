@@ -7,6 +7,7 @@
 //                of the elements and the viscous stresses among them
 #pragma once
 
+#include "solid-dealii/ranks.hpp"
 #include "solid-dealii/solid_state.hpp"
 
 #include <filesystem>
@@ -18,6 +19,10 @@ struct SavedState {
   SolidState state;
   double time = 0; ///< [s]
 };
+
+/// The file of this rank: `whole` for one, for several a name with rank and ranks, as the parts of
+/// a body are read by as many ranks as wrote them.
+std::filesystem::path state_file(const std::filesystem::path &whole, const Ranks &ranks);
 
 /// Writes the file whole or not at all: under another name first, which is then changed.
 /// Throws UserError if the folder cannot be written or the disk is full.

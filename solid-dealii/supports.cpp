@@ -36,31 +36,35 @@ int normal_axis(const Discretisation<dim> &d, const std::vector<int> &faces,
 } // namespace
 
 template <int dim> Supports supports_of(const Discretisation<dim> &d, const SolidParams &params) {
-  Supports s{std::vector<bool>(static_cast<std::size_t>(d.n_dofs()), false), {}, {}};
-  const auto fix = [&](int node, int c) {
-    s.fixed[static_cast<std::size_t>(dim * node + c)] = true;
-  };
+  Supports s;
+  // Counts, not flags: a node may be on a rank whose cells have no face of the part.
+  Eigen::VectorXd fixed = Eigen::VectorXd::Zero(d.n_dofs()), held = fixed;
   for (const auto &part :
        params.boundaries.empty() ? default_boundaries(params) : params.boundaries) {
     const std::vector<int> &faces = d.boundary(part.name);
     if (part.kind == "wetted")
       s.wetted.insert(s.wetted.end(), faces.begin(), faces.end());
     else if (part.kind == "symmetry") {
+      if (faces.empty())
+        continue; // on this rank
       const int axis = normal_axis(d, faces, part.name);
       for (const int node : d.nodes_of(faces))
-        fix(node, axis);
+        fixed[dim * node + axis] += 1;
     } else if (part.kind == "clamped") {
-      const auto nodes = d.nodes_of(faces);
-      for (const int node : nodes)
-        for (int c = 0; c < dim; ++c)
-          fix(node, c);
-      s.held.insert(s.held.end(), nodes.begin(), nodes.end());
+      for (const int node : d.nodes_of(faces))
+        held.template segment<dim>(dim * node).array() += 1;
     }
   }
-  for (std::vector<int> *list : {&s.wetted, &s.held}) {
-    std::sort(list->begin(), list->end());
-    list->erase(std::unique(list->begin(), list->end()), list->end());
-  }
+  std::sort(s.wetted.begin(), s.wetted.end());
+  s.wetted.erase(std::unique(s.wetted.begin(), s.wetted.end()), s.wetted.end());
+  fixed += held;
+  d.components.add_up(fixed);
+  d.components.add_up(held);
+  for (const double count : fixed)
+    s.fixed.push_back(count > 0);
+  for (int node = 0; node < d.n_nodes(); ++node)
+    if (held[dim * node] > 0)
+      s.held.push_back(node);
   return s;
 }
 
@@ -76,6 +80,7 @@ Eigen::VectorXd own_load(const Discretisation<dim> &d, const SolidParams &params
               dim * d.cell_nodes[static_cast<std::size_t>(k * d.nodes_per_cell + a)]) +=
               d.weights[static_cast<std::size_t>(k * d.points_per_cell + q)] *
               d.values[static_cast<std::size_t>(q * d.nodes_per_cell + a)] * weight;
+    d.components.add_up(load);
   }
   for (const auto &part : params.boundaries)
     if (!part.traction.empty()) {

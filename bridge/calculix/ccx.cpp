@@ -165,8 +165,14 @@ void Ccx::run(const std::string &job, const std::string &task) {
   cost_.seconds += watch.seconds();
   cost_.cpu_seconds += ended.cpu_seconds;
   const std::string failure = what_failed(ended.status, text_of(log), result);
-  check(failure.empty(), "calculix: ccx failed in {}: it {}. Its input and what it said: {}, {}",
-        task, failure, (folder_ / (job + ".inp")).string(), log.string());
+  if (failure.empty())
+    return;
+  const std::string message =
+      fmt::format("calculix: ccx failed in {}: it {}. Its input and what it said: {}, {}", task,
+                  failure, (folder_ / (job + ".inp")).string(), log.string());
+  if (failure.find("diverge") != std::string::npos)
+    throw Diverged(message);
+  throw UserError(message);
 }
 
 } // namespace sluice::calculix

@@ -6,10 +6,19 @@
 // file.
 #pragma once
 
+#include "bridge/base/check.hpp"
+
 #include <filesystem>
 #include <string>
 
 namespace sluice::calculix {
+
+/// ccx found no equilibrium: under another load, or in a shorter window, it may. `what()` has its
+/// words.
+class Diverged : public UserError {
+public:
+  using UserError::UserError;
+};
 
 struct CcxCost {
   long runs = 0;
@@ -23,8 +32,9 @@ public:
   /// threads. Throws UserError when there is no such program.
   Ccx(const std::string &program, int threads, std::filesystem::path folder);
 
-  /// Runs `job`.inp; its output goes to `job`.log, its state to `job`.rout. Throws UserError naming
-  /// `task` ("window 3 (t = 4e-4 to 6e-4 s)"), what ccx said, and its files.
+  /// Runs `job`.inp; its output goes to `job`.log, its state to `job`.rout. Throws Diverged, or
+  /// UserError for any other failure, naming `task` ("window 3 (t = 4e-4 to 6e-4 s)"), what ccx
+  /// said, and its files.
   void run(const std::string &job, const std::string &task);
 
   const CcxCost &cost() const { return cost_; }

@@ -32,8 +32,7 @@ public:
     while (bridge.is_coupling_ongoing()) {
       const double dt = bridge.max_time_step_size();
       read_forces(bridge, dt);
-      motion_ = windows_.solve(loads_, dt);
-      write_motion(bridge);
+      advance_solid(bridge, dt);
       bridge.advance(dt);
       // An iterate that is refused leaves no trace: the next one starts from the same state.
       if (bridge.is_time_window_complete())
@@ -57,6 +56,17 @@ private:
     loads_ = surface().scatter(forces_);
     for (NodalForce &load : loads_)
       load.force = load.force.unaryExpr(&rounded_as_ccx_reads);
+  }
+
+  // A window without a solution is the bridge's to cut; where it may not, it ends both programs
+  // with the reason.
+  void advance_solid(bridge::Participant &bridge, double dt) {
+    try {
+      motion_ = windows_.solve(loads_, dt);
+      write_motion(bridge);
+    } catch (const Diverged &failure) {
+      bridge.report_failure(failure.what());
+    }
   }
 
   void write_motion(bridge::Participant &bridge) const {

@@ -100,9 +100,9 @@ def precision_settings(spacings, steps, end):
             for spacing in spacings for step in steps]
 
 
-def execute(setting, folder, limit_s):
+def execute(setting, folder, limit_s, case_file=CASE_FILE, options=()):
     """Runs the case into `folder`; returns what stopped it from outside, or an empty text."""
-    command = [str(LAUNCHER), "run", str(CASE_FILE), "--out", str(folder)]
+    command = [str(LAUNCHER), "run", str(case_file), "--out", str(folder), *options]
     for text in setting.overrides():
         command += ["--set", text]
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)

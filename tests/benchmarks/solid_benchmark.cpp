@@ -3,11 +3,13 @@
 // membrane by mesh, plates of 52,000 and 307,000 unknowns. CPU seconds, so that a busy machine
 // shows less.
 //
-//   build/solid-dealii/solid_benchmark gate | cost | cook | plate ACROSS ALONG DEEP ELEMENT
+//   build/solid-dealii/solid_benchmark gate | cost | cook
+//   [mpirun -n N] build/solid-dealii/solid_benchmark plate ACROSS ALONG DEEP ELEMENT [STEPS]
 #include "bridge/base/timer.hpp"
 #include "solid-dealii/interface.hpp"
 #include "solid-dealii/solid_solver.hpp"
 
+#include <fmt/format.h>
 #include <sys/resource.h>
 
 #include <cstdio>
@@ -203,51 +205,70 @@ double peak_memory_gb() {
   return static_cast<double>(usage.ru_maxrss) / 1048576;
 }
 
+// Seconds since the last call, of the slowest rank: CPU and wall time as text. Waiting for another
+// rank is CPU time too.
+class Lap {
+public:
+  explicit Lap(const Ranks &ranks) : ranks_(ranks) {}
+  std::string operator()(int parts = 1) {
+    const double cpu = process_cpu_time(), wall = watch_.seconds();
+    const auto text = fmt::format("{:.3f} s CPU, {:.3f} s wall", ranks_.max(cpu - cpu_) / parts,
+                                  ranks_.max(wall - wall_) / parts);
+    cpu_ = process_cpu_time();
+    wall_ = watch_.seconds();
+    return text;
+  }
+
+private:
+  Ranks ranks_;
+  Stopwatch watch_;
+  double cpu_ = process_cpu_time(), wall_ = 0;
+};
+
 // One linearisation at rest of a square plate, static (K) and dynamic (K + 1e8 rho M, about a step
-// of 2e-4 s), then steps in time.
-void plate(int across, int along, int deep, const char *element) {
+// of 2e-4 s), then `steps` in time. On all ranks of mpirun.
+void plate(int across, int along, int deep, const char *element, int steps) {
   auto p = gate(element, across, along, 3);
   p.elements_deep = deep;
   p.depth = 0.079;
   p.linear_solver = "cg";
-  double start = process_cpu_time();
-  const auto lap = [&] {
-    const double now = process_cpu_time(), spent = now - start;
-    start = now;
-    return spent;
+  const Ranks ranks = Ranks::of_launch();
+  const auto say = [&](const std::string &text) {
+    if (ranks.is_root())
+      fmt::print("{}\n", text);
+    std::fflush(stdout);
   };
-  SolidSolver<3> s(p);
+  Lap lap(ranks);
+  SolidSolver<3> s(p, ranks);
   auto &assembly = const_cast<Assembly<3> &>(s.assembly());
   const auto rest = s.initial_state();
-  std::printf("%s %dx%dx%d: %d unknowns, %.1f M entries, made in %.2f s\n", element, across, along,
-              deep, assembly.n_free(), 1e-6 * static_cast<double>(assembly.tangent().nonZeros()),
-              lap());
+  say(fmt::format("{} {}x{}x{}, {} ranks: {} unknowns, {:.1f} M entries", element, across, along,
+                  deep, ranks.size(), assembly.n_free_of_all(),
+                  1e-6 * ranks.sum(static_cast<double>(assembly.tangent().nonZeros()))));
+  say("  set-up of the body " + lap());
   assembly.linearise(rest.displacement, rest.modes);
-  std::printf("  assembly %.3f s\n", lap());
-  const Eigen::VectorXd right = assembly.restrict_to_free(dead_load(s));
+  say("  assembly " + lap());
+  const Eigen::VectorXd load = dead_load(s), right = assembly.restrict_to_free(load);
   for (const double c : {0.0, 1e8}) {
     const SparseMatrix matrix = assembly.tangent() + c * assembly.mass();
     LinearSolver cg(matrix, LinearSolverKind::cg, [&] { return assembly.rigid_motions(); });
     lap();
     cg.factorise(matrix);
-    const double set_up = lap();
+    say(fmt::format("  {}: multigrid {}", c > 0 ? "dynamic" : "static", lap()));
     cg.solve(right);
-    const double solve = lap();
-    std::printf("  %s: set-up %.2f s, CG to %.0e %.2f s (%d iterations)\n",
-                c > 0 ? "dynamic" : "static", set_up, LinearSolver::cg_tolerance, solve,
-                cg.last_iterations());
+    say(fmt::format("    CG to {:.0e} {} ({} iterations)", LinearSolver::cg_tolerance, lap(),
+                    cg.last_iterations()));
   }
   SolidState state = rest;
-  const Eigen::VectorXd load = dead_load(s);
-  constexpr int n = 5;
   lap();
-  for (int k = 0; k < n; ++k)
+  for (int k = 0; k < steps; ++k)
     state = s.step(state, load, 2e-4);
-  std::printf(
-      "  %d steps of 2e-4 s: %.2f s a step, %.1f Newton and %.1f CG iterations a step; peak "
-      "memory %.2f GB\n",
-      n, lap() / n, static_cast<double>(s.counts().iterations) / n,
-      static_cast<double>(s.counts().linear_iterations) / n, peak_memory_gb());
+  const std::string time = lap(steps);
+  say(fmt::format("  {} steps of 2e-4 s: {} a step, {:.1f} Newton and {:.1f} CG iterations; peak "
+                  "memory of a rank {:.2f} GB",
+                  steps, time, static_cast<double>(s.counts().iterations) / steps,
+                  static_cast<double>(s.counts().linear_iterations) / steps,
+                  ranks.max(peak_memory_gb())));
 }
 
 } // namespace
@@ -263,11 +284,12 @@ int main(int argc, char **argv) {
       cost_table();
     else if (what == "cook")
       cook_table();
-    else if (what == "plate" && argc == 6)
-      plate(std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]), argv[5]);
+    else if (what == "plate" && argc >= 6)
+      plate(std::atoi(argv[2]), std::atoi(argv[3]), std::atoi(argv[4]), argv[5],
+            argc > 6 ? std::atoi(argv[6]) : 5);
     else {
-      std::fprintf(stderr,
-                   "solid_benchmark gate | cost | cook | plate ACROSS ALONG DEEP ELEMENT\n");
+      std::fprintf(
+          stderr, "solid_benchmark gate | cost | cook | plate ACROSS ALONG DEEP ELEMENT [STEPS]\n");
       return 2;
     }
   } catch (const std::exception &error) {

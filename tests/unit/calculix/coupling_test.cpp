@@ -46,16 +46,20 @@ std::vector<double> push(const bridge::InterfaceMesh &mesh, double force) {
   return forces;
 }
 
-// In every iteration of window k the force is k `force`, whatever the gate does.
+// In every iteration of window k the force is k `force`, whatever the gate does; `burst` instead in
+// a third window that was not cut.
 void scripted_fluid(const Config &config, std::unique_ptr<bridge::Transport> transport,
-                    const fs::path &folder, int dim, double force) {
+                    const fs::path &folder, int dim, double force, double burst) {
   bridge::Participant bridge("fluid", config, folder, std::move(transport));
   const bridge::InterfaceMesh mesh = surface_of(dim).mesh;
   bridge.set_mesh(mesh);
   bridge.initialize();
   while (bridge.is_coupling_ongoing()) {
-    bridge.write_data("force", push(mesh, static_cast<double>(bridge.time_window()) * force));
-    bridge.advance(bridge.max_time_step_size());
+    const double length = bridge.max_time_step_size();
+    const bool bursts = burst > 0 && bridge.time_window() == 3 && length > 0.6 * dt;
+    bridge.write_data(
+        "force", push(mesh, bursts ? burst : static_cast<double>(bridge.time_window()) * force));
+    bridge.advance(length);
   }
   bridge.finalize();
 }
@@ -64,13 +68,14 @@ struct Outcome {
   std::string solid_error, fluid_error;
 };
 
-Outcome couple(const fs::path &folder, int dim, double force) {
-  const Config config = Config::parse(case_text(dim), "case.toml");
+Outcome couple(const fs::path &folder, int dim, double force,
+               const std::vector<std::string> &overrides = {}, double burst = 0) {
+  const Config config = Config::parse(case_text(dim), "case.toml", overrides);
   Outcome outcome;
   auto [ours, theirs] = bridge::local_transports();
   std::thread fluid([&, transport = std::move(theirs)]() mutable {
     outcome.fluid_error =
-        error_of([&] { scripted_fluid(config, std::move(transport), folder, dim, force); });
+        error_of([&] { scripted_fluid(config, std::move(transport), folder, dim, force, burst); });
   });
   outcome.solid_error = error_of([&] {
     bridge::Participant bridge("solid", config, folder, std::move(ours));
@@ -152,6 +157,19 @@ TEST(CalculixCoupling, ccx_that_fails_is_told_to_the_partner_and_in_the_summary)
   EXPECT_FALSE(summary.at("completed").get<bool>());
   EXPECT_TRUE(contains(summary.at("message").get<std::string>(), "diverge"));
   EXPECT_EQ(read_csv(folder.path() / "tip.csv").size(), 1u) << "what was computed is there";
+}
+
+TEST(CalculixCoupling, a_window_that_ccx_diverges_in_is_cut_by_the_bridge) {
+  const TemporaryFolder folder;
+  const Outcome outcome = couple(folder.path(), 2, 0.1, {"bridge.max_halvings=1"}, 1e13);
+  ASSERT_EQ(outcome.solid_error, "");
+  ASSERT_EQ(outcome.fluid_error, "");
+  const auto summary = read_summary(folder.path());
+  EXPECT_TRUE(summary.at("completed").get<bool>());
+  EXPECT_EQ(summary.at("halved_windows").get<int>(), 1);
+  const auto tips = read_csv(folder.path() / "tip.csv");
+  EXPECT_GT(tips.size(), 1u + n_windows);
+  EXPECT_NEAR(tips.back()[0], n_windows * dt, 1e-15);
 }
 
 } // namespace

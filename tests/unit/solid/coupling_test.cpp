@@ -81,7 +81,7 @@ Outcome couple(const std::string &name, Force force_of,
   });
   try {
     bridge::Participant bridge("solid", config, outcome.folder, std::move(ours));
-    run(bridge, config, outcome.folder);
+    run(&bridge, config, outcome.folder);
   } catch (const std::exception &error) {
     outcome.solid_error = error.what();
   }
@@ -292,6 +292,29 @@ TEST(Coupling, a_solid_that_fails_tells_its_partner_and_leaves_a_summary) {
   EXPECT_NE(summary.at("message").get<std::string>().find("largest nodal force"),
             std::string::npos);
   EXPECT_GE(read_csv(outcome.folder / "tip.csv").size(), 2u) << "what was computed is there";
+}
+
+// Three iterations do not solve every window of 2 ms; they solve shorter ones.
+TEST(Coupling, a_window_that_newton_cannot_solve_is_cut_by_the_bridge) {
+  const auto run_with = [](const char *name, int iterations, const char *window) {
+    return couple(name, constant_force,
+                  {fmt::format("solid.newton_max_iterations={}", iterations),
+                   fmt::format("case.time_step_s={}", window), "solid.max_step_cuts=0",
+                   "bridge.max_halvings=5"});
+  };
+  const Outcome cut = run_with("cut", 3, "2e-3"), fine = run_with("fine", 25, "2.5e-4");
+  ASSERT_EQ(cut.solid_error, "");
+  ASSERT_EQ(cut.fluid_error, "");
+  const auto summary = read_json(cut.folder / "solid_summary.json");
+  EXPECT_TRUE(summary.at("completed").get<bool>());
+  EXPECT_GT(summary.at("halved_windows").get<int>(), 0);
+  EXPECT_EQ(summary.at("solid_cut_steps").get<int>(), 0) << "the bridge cut, not the solid";
+  const auto tips = read_csv(cut.folder / "tip.csv"), exact = read_csv(fine.folder / "tip.csv");
+  EXPECT_GT(tips.size(), 3u) << "at rest, and more than two windows";
+  EXPECT_NEAR(tips.back()[0], 4e-3, 1e-15);
+  // A step shifts its load by 0.06 of its length (README, Time): 0.12 ms of 4 ms, over which the
+  // tip moves with the square of time.
+  EXPECT_NEAR(tips.back()[1] / exact.back()[1], 1, 0.06);
 }
 
 } // namespace

@@ -3,6 +3,7 @@
 // the elastica, a slender beam. Finer meshes of the same: tests/benchmarks/solid_benchmark.cpp.
 #include "gate.hpp"
 
+#include "bridge/mapping_mortar.hpp"
 #include "bridge/mapping_projection.hpp"
 #include "solid-dealii/cell_system.hpp"
 #include "solid-dealii/interface.hpp"
@@ -133,10 +134,12 @@ TEST(ManufacturedSolution, mixed_element_keeps_its_order_next_to_incompressibili
 
 // ---- patch test under mapped tractions ----------------------------------------------------------
 
+using MapMaker = bridge::Mapping (*)(const bridge::InterfaceMesh &, const bridge::InterfaceMesh &);
+
 // A square between two symmetry planes, pulled to the right by a uniform traction that comes from a
 // partner's mesh of `n_partner` segments through the bridge's map. Returns the largest difference
 // of the displacement to the uniform state, relative to its largest value.
-double mapped_patch_error(int n_solid, int n_partner) {
+double mapped_patch_error(MapMaker map_of, int n_solid, int n_partner) {
   SolidParams p;
   p.width = p.height = 1;
   p.elements_across = p.elements_along = n_solid;
@@ -157,7 +160,7 @@ double mapped_patch_error(int n_solid, int n_partner) {
     forces[static_cast<std::size_t>(2 * k)] =
         traction / n_partner * (k == 0 || k == n_partner ? 0.5 : 1);
   }
-  const auto map = bridge::projection_map(partner, surface.mesh);
+  const auto map = map_of(partner, surface.mesh);
   const auto state = solver.solve_static(
       surface.scatter(map.conservative(forces), solver.discretisation().n_dofs()));
   p.boundaries[2].kind = "free";
@@ -168,15 +171,25 @@ double mapped_patch_error(int n_solid, int n_partner) {
          uniform.displacement.cwiseAbs().maxCoeff();
 }
 
-// Where the partner's nodes are among the solid's (or refine them) the forces are exact; elsewhere
-// they are a rule of quadrature whose error in a nodal force is at most 0.75 (h/H)^2 of it: one
-// kink of the solid's shape function in a segment costs h^2/8 times the jump of its slope, and it
-// has three.
-TEST(Patch, a_uniform_traction_through_the_bridge_gives_uniform_stress) {
-  EXPECT_LT(mapped_patch_error(4, 4), 1e-8) << "Newton's tolerance";
-  EXPECT_LT(mapped_patch_error(4, 12), 1e-8);
+// The mortar's rows are integrals over the overlaps of the faces, and its dual functions sum to
+// one: a uniform traction arrives as the consistent load, whatever the two meshes.
+TEST(Patch, a_uniform_traction_through_the_mortar_gives_uniform_stress_on_any_two_meshes) {
+  for (const int n : {1, 3, 4, 7, 18, 37}) {
+    const double error = mapped_patch_error(bridge::mortar_map, 4, n);
+    std::printf("%d segments on 4 cells: %.1e of the displacement\n", n, error);
+    EXPECT_LT(error, 1e-8) << "Newton's tolerance; " << n << " segments";
+  }
+}
+
+// The projection's are values at the partner's nodes. Where those are among the solid's (or refine
+// them) the forces are exact; elsewhere they are a rule of quadrature whose error in a nodal force
+// is at most 0.75 (h/H)^2 of it: one kink of the solid's shape function in a segment costs h^2/8
+// times the jump of its slope, and it has three.
+TEST(Patch, a_uniform_traction_through_the_projection_errs_with_second_order) {
+  EXPECT_LT(mapped_patch_error(bridge::projection_map, 4, 4), 1e-8) << "Newton's tolerance";
+  EXPECT_LT(mapped_patch_error(bridge::projection_map, 4, 12), 1e-8);
   for (const int n : {7, 18, 37}) {
-    const double error = mapped_patch_error(4, n);
+    const double error = mapped_patch_error(bridge::projection_map, 4, n);
     std::printf("%d segments on 4 cells: %.2e of the displacement\n", n, error);
     EXPECT_LT(error, 0.75 * 16.0 / (n * n));
   }
