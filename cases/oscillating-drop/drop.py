@@ -38,7 +38,7 @@ class Drop:
     """Table [parameters]; radius one, density 1000."""
 
     motion: str = "stretching"
-    points_across: int = 60
+    points_across: int = 120
 
     def __post_init__(self):
         if self.motion not in FLOWS:
