@@ -166,10 +166,11 @@ private:
   /// Sets those of the cells in `lanes` that the memory knows and that are closed; returns them.
   unsigned take_known(const PackedStencil<2> &s, unsigned lanes) const {
     const PackedCells cells = known_cells(s, points_, cloud_, cloud_.cell_memory);
+    const double in_sight = 0.5 * cloud_.radius; // a corner there is as far from points in no list
     lanes &= bits_of(cells.is_known);
     for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
       const int l = std::countr_zero(rest), i = s.first() + l;
-      if (std::sqrt(cells.reach2[l]) <= limit_of(i))
+      if (std::sqrt(cells.reach2[l]) <= std::min(limit_of(i), in_sight))
         set_closed(i, cells.volume[l], {cells.centroid[0][l], cells.centroid[1][l]});
       else
         lanes &= ~(1u << l);

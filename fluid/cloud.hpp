@@ -14,9 +14,9 @@
 namespace sluice::fluid {
 
 enum class PointKind : std::int32_t { // wide enough to be gathered
-  interior, // pressure from the Poisson equation
-  surface,  // at the free surface: pressure falls to zero half a spacing outside
-  thin,     // open on both sides, or nearly alone: pressure is zero
+  interior,                           // pressure from the Poisson equation
+  surface, // at the free surface: pressure falls to zero half a spacing outside
+  thin,    // open on both sides, or nearly alone: pressure is zero
 };
 
 /// The points that cut one cell, counter-clockwise; none: not known.

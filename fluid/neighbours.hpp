@@ -45,9 +45,9 @@ struct CellRanges {
 /// Neighbours within the kernel radius, the point itself excluded.
 /// Lists have room for `capacity` entries each, so that one pass fills them.
 struct NeighbourLists {
-  int capacity = 32;      // entries per point
-  std::vector<int> count; // length of each list
-  std::vector<int> index; // capacity entries per point
+  int capacity = 32;              // entries per point
+  std::vector<int> count;         // length of each list
+  std::vector<int> index;         // capacity entries per point
   std::vector<double> coordinate; // of the points, direction by direction, for the search
 
   std::span<const int> of(int i) const { return {first(i), static_cast<std::size_t>(count[i])}; }

@@ -16,7 +16,8 @@ public:
   /// Of the points first .. first + 7, `first` a multiple of eight.
   PackedStencil(int first, const Points<dim> &points, const Cloud<dim> &cloud)
       : first_(first), count_(std::min(pack_size, points.size() - first)),
-        width_(cloud.slices.width(first)), column_(cloud.slices.column.data() + cloud.slices.place(first, 0)),
+        width_(cloud.slices.width(first)),
+        column_(cloud.slices.column.data() + cloud.slices.place(first, 0)),
         position_(points.position.data()), scale_(1 / cloud.radius) {
     for (int l = 0; l < pack_size; ++l) {
       self_[l] = first + std::min(l, count_ - 1);
@@ -26,8 +27,8 @@ public:
   }
 
   int first() const { return first_; }
-  int count() const { return count_; } ///< points that there are
-  int width() const { return width_; } ///< entries of each list, filled up
+  int count() const { return count_; }    ///< points that there are
+  int width() const { return width_; }    ///< entries of each list, filled up
   double scale() const { return scale_; } ///< 1 / radius [1/m]
   const int *self() const { return self_.data(); }
   const int *neighbours(int k) const { return column_ + k * SlicedPattern::lanes; }

@@ -128,9 +128,8 @@ template <class Flag> PackMask gathered_equal(const int *index, const Flag *flag
   static_assert(sizeof(Flag) == 4);
 #ifdef __AVX512F__
   const __m256i at = _mm256_loadu_si256(reinterpret_cast<const __m256i *>(index));
-  const __m256i v = _mm256_mask_i32gather_epi32(_mm256_setzero_si256(),
-                                                reinterpret_cast<const int *>(flag), at,
-                                                _mm256_set1_epi32(-1), 4);
+  const __m256i v = _mm256_mask_i32gather_epi32(
+      _mm256_setzero_si256(), reinterpret_cast<const int *>(flag), at, _mm256_set1_epi32(-1), 4);
   const __m256i equal = _mm256_cmpeq_epi32(v, _mm256_set1_epi32(static_cast<int>(value)));
   return (PackMask)_mm512_cvtepi32_epi64(equal);
 #else

@@ -58,7 +58,7 @@ points_m = [[0, 0.3], [0, 0], [0.8, 0]]
 /// between uses. `n` points, `e` pairs of neighbours (both ways), `m` pressure iterations.
 template <int dim> std::map<std::string, double> least_bytes(double n, double e, double m) {
   const double vec = 8 * dim, functionals = 8 * n_terms<dim> * dim;
-  const double geometry = vec * n + 4 * e; // positions and lists
+  const double geometry = vec * n + 4 * e;                            // positions and lists
   const double cycle = 2 * 8 * e + 12 * n, product = 12 * e + 24 * n; // of the solve
   return {{"search", vec * n + 4 * e},
           {"cells", geometry + (8 + 2 * vec) * n},
@@ -116,10 +116,11 @@ template <int dim> Timing measure(double spacing, int steps) {
 
 template <int dim> void report(double spacing, int steps, double bandwidth) {
   const Timing t = measure<dim>(spacing, steps);
-  std::printf("\n%d-D, %d points, %.1f neighbours, %d thread(s): %.2f ms a step, %.3f us per point, "
-              "%.1f iterations (at most %d)\n",
-              dim, t.points, t.pairs / t.points, number_of_threads(), t.total,
-              1e3 * t.total / t.points, t.iterations, t.most_iterations);
+  std::printf(
+      "\n%d-D, %d points, %.1f neighbours, %d thread(s): %.2f ms a step, %.3f us per point, "
+      "%.1f iterations (at most %d)\n",
+      dim, t.points, t.pairs / t.points, number_of_threads(), t.total, 1e3 * t.total / t.points,
+      t.iterations, t.most_iterations);
   const auto bytes = least_bytes<dim>(t.points, t.pairs, t.iterations);
   for (const auto &[name, ms] : t.ms) {
     std::printf("  %-16s %8.3f ms %8.1f ns per point", name.c_str(), ms, 1e6 * ms / t.points);
@@ -139,9 +140,10 @@ int main(int argc, char **argv) {
   const int steps = argc > 3 ? std::atoi(argv[3]) : 20;
   const int smallest = argc > 4 ? std::atoi(argv[4]) : 0;
   const double memory = triad_bandwidth(1500), cache = triad_bandwidth(24);
-  std::printf("triad with %d thread(s): %.1f GB/s from memory, %.1f from 24 MB; shortest of %d steps; "
-              "bounds by the latter\n",
-              number_of_threads(), memory, cache, steps);
+  std::printf(
+      "triad with %d thread(s): %.1f GB/s from memory, %.1f from 24 MB; shortest of %d steps; "
+      "bounds by the latter\n",
+      number_of_threads(), memory, cache, steps);
   for (const int nx : {54, 100, 200, 400, 845})
     if (const int n = nx * (nx * 7 / 5); n >= smallest && n <= largest)
       report<2>(0.1 / nx, steps, cache);

@@ -11,8 +11,9 @@ constexpr double weight_density = 9810, depth = 0.14, gate = 0.079;
 
 struct StillWater : FluidSolver<2> {
   explicit StillWater(const std::string &spacing)
-      : FluidSolver<2>(testing::scene_of(
-      testing::gate_tank(), {"fluid.spacing_m=" + spacing, "fluid.pressure_tolerance=1e-12"})) {
+      : FluidSolver<2>(
+            testing::scene_of(testing::gate_tank(),
+                              {"fluid.spacing_m=" + spacing, "fluid.pressure_tolerance=1e-12"})) {
     begin_step(1e-3);
     iterate();
   }
