@@ -117,7 +117,7 @@ Bytes Link::receive_bytes(FrameType expected, std::size_t limit, std::string_vie
 Bytes Link::next_frame(FrameType expected, std::size_t limit, std::string_view activity) {
   while (true) {
     const FrameHeader header = read_header();
-    const bool is_last = header.type == FrameType::abort;
+    const bool is_last = header.type == FrameType::abort && hears_last_words_;
     Bytes payload = read_payload(header, is_last ? longest_last_message : limit);
     if (is_last)
       report_abort(payload, activity);
@@ -198,7 +198,7 @@ void Link::report_loss(std::string_view activity, std::string_view reason) {
     while (true) {
       const FrameHeader header = read_header();
       const Bytes payload = read_payload(header, largest_frame);
-      if (header.type == FrameType::abort)
+      if (header.type == FrameType::abort && hears_last_words_)
         report_abort(payload, activity);
     }
   } catch (const UserError &) {

@@ -17,6 +17,10 @@
 
 namespace sluice::bridge {
 
+/// Whether a partner that is not trusted yet may say why it gives up: the one that was called upon
+/// may, whoever knocks has to show its token first.
+enum class LastWords { heard, unheard };
+
 class Link {
 public:
   /// `self` and `partner` are the roles ("fluid", "solid"); `silence_deadline` [s] bounds the time
@@ -29,8 +33,14 @@ public:
 
   /// Whatever trickles in, every wait ends by `deadline`, and a heartbeat is no greeting: for a
   /// connection that may be a stranger's. Until `trust`.
-  void distrust(Deadline deadline) { greeting_deadline_ = deadline; }
-  void trust() { greeting_deadline_.reset(); }
+  void distrust(Deadline deadline, LastWords last_words) {
+    greeting_deadline_ = deadline;
+    hears_last_words_ = last_words == LastWords::heard;
+  }
+  void trust() {
+    greeting_deadline_.reset();
+    hears_last_words_ = true;
+  }
 
   /// From now on a thread sends a heartbeat five times per silence deadline (once a second at
   /// least), whatever this side computes.
@@ -81,6 +91,7 @@ private:
   std::string self_, partner_;
   double silence_deadline_;
   std::optional<Deadline> greeting_deadline_;
+  bool hears_last_words_ = true;
   double wait_s_ = 0;
   std::atomic<std::uint64_t> bytes_sent_ = 0; // by both threads
   std::uint64_t bytes_received_ = 0;
