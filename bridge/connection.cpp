@@ -127,10 +127,11 @@ std::vector<std::string> lines_of(const std::string &text) {
   const auto line = [&](const std::vector<std::string> &lines) {
     return k < lines.size() ? fmt::format("'{}'", lines[k]) : std::string("nothing more");
   };
-  fail(
-      "bridge: the two programs read different case files (or got different --set options): the {} "
-      "has {}, the {} has {}",
-      name_of(self), line(a), name_of(partner_of(self)), line(b));
+  fail("bridge: the two programs read different case files (or got different --set options, or "
+       "restart "
+       "files of different windows): the {} "
+       "has {}, the {} has {}",
+       name_of(self), line(a), name_of(partner_of(self)), line(b));
 }
 
 void send_case(Link &link, const std::string &text) {

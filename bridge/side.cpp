@@ -52,6 +52,14 @@ void check_position(PayloadReader &read, long window, int iteration) {
                     there_iteration, window, iteration));
 }
 
+void check_restored(std::size_t n_saved, std::size_t n_needed) {
+  check(
+      n_saved == n_needed,
+      "bridge: the restart file holds {} values on the interface, its mesh now needs {}; mesh and "
+      "spacing must be those of the run that wrote it",
+      n_saved, n_needed);
+}
+
 std::vector<double> read_values(PayloadReader &read, std::size_t n) {
   std::vector<double> values = read.reals();
   if (values.size() != n)

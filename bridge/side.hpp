@@ -9,6 +9,7 @@
 #include "bridge/link.hpp"
 #include "bridge/mapping.hpp"
 #include "bridge/scheme.hpp"
+#include "bridge/state_archive.hpp"
 #include "bridge/window_clock.hpp"
 
 #include <map>
@@ -25,6 +26,7 @@ struct WindowField {
   std::vector<double> before;     ///< at the start of the window before; empty in the first
   /// The window is accepted: the next one starts from `accepted`.
   void move_on(std::vector<double> accepted) { before = std::exchange(start, std::move(accepted)); }
+  template <class Archive> void archive(Archive &a) { a(start, end, before); }
 };
 
 /// What both sides know of the run at an exchange.
@@ -35,6 +37,7 @@ struct Exchange {
   int iteration;                             ///< of this window, from 1
   const std::optional<WindowTotals> &totals; ///< own report of the window before
   const std::string &failure; ///< why this side could not do the window; "" if it did
+  bool wants_to_stop = false; ///< this side, at the end of the window
 };
 
 class Side {
@@ -48,11 +51,16 @@ public:
   /// At the end of an iteration; throws UserError for a window that fails for good.
   virtual Verdict advance(const Exchange &exchange) = 0;
   virtual void finalize(const Exchange &exchange) = 0;
+  /// Between two windows: all that the next ones depend on; back again after initialize. Throws
+  /// UserError for the state of another mesh.
+  virtual void save(StateWriter &state) = 0;
+  virtual void restore(StateReader &state) = 0;
   virtual void add_totals(const WindowTotals &, Statistics &) {}
   virtual const MapReport &map_report() const = 0;
 
   std::map<std::string, WindowField, std::less<>> readable;
   std::map<std::string, std::vector<double>, std::less<>> writable;
+  bool stops_here = false; ///< agreed by both at the end of a window
 };
 
 std::unique_ptr<Side> make_fluid_side(const BridgeSettings &settings);
@@ -72,6 +80,8 @@ InterfaceMesh receive_mesh(Link &link);
 /// programs are not at the same one.
 void write_position(PayloadWriter &write, const Exchange &exchange);
 void check_position(PayloadReader &read, long window, int iteration);
+/// Throws UserError where a restored field has another size than the mesh at hand.
+void check_restored(std::size_t n_saved, std::size_t n_needed);
 /// Reads values of which there must be `n`.
 std::vector<double> read_values(PayloadReader &read, std::size_t n);
 /// As the report is sent: the fluid builds the map, the solid learns what it looks like.

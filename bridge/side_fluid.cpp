@@ -17,6 +17,7 @@ struct Answer {
   std::string explanation; // of a failure, or of a window that is tried again
   Motion accepted;         // of the window's end, when it converged in an implicit scheme
   Motion next;             // to compute with
+  bool stops_here = false; // the window was the run's last for now
 };
 
 MapKind kind_of(const std::string &mapping) {
@@ -70,6 +71,7 @@ public:
       ++exchange.statistics.failed_windows;
       throw UserError(answer.explanation);
     }
+    stops_here = answer.stops_here;
     exchange.statistics.halved_windows += answer.verdict == Verdict::retry;
     update("displacement", answer.verdict, answer.accepted.displacement, answer.next.displacement);
     if (has_velocity_)
@@ -85,6 +87,18 @@ public:
                           [](PayloadReader &) { return 0; });
   }
 
+  void save(StateWriter &state) override {
+    for (auto &[name, field] : readable)
+      state(field);
+  }
+  void restore(StateReader &state) override {
+    for (auto &[name, field] : readable) {
+      const std::size_t needed = field.start.size();
+      state(field);
+      check_restored(field.start.size(), needed);
+    }
+  }
+
   const MapReport &map_report() const override { return map_.report(); }
 
 private:
@@ -98,7 +112,7 @@ private:
   void send_forces(const Exchange &exchange) {
     PayloadWriter payload;
     write_position(payload, exchange);
-    payload.text(exchange.failure);
+    payload.text(exchange.failure).number(exchange.wants_to_stop);
     payload.reals(map_.conservative(writable.find("force")->second));
     write_totals(payload, over_depth(exchange.totals, map_.depth()));
     exchange.link.send(FrameType::forces, std::move(payload));
@@ -133,6 +147,8 @@ private:
       answer.explanation = read.text();
     if (answer.verdict == Verdict::failed)
       return answer;
+    if (answer.verdict == Verdict::converged)
+      answer.stops_here = read.number() != 0;
     if (answer.verdict == Verdict::converged && is_implicit_)
       answer.accepted = read_motion(read);
     answer.next = read_motion(read);

@@ -80,6 +80,15 @@ public:
     exchange.link.send(FrameType::goodbye, PayloadWriter());
   }
 
+  void save(StateWriter &state) override {
+    state(readable.find("force")->second, *scheme_, balance_);
+  }
+  void restore(StateReader &state) override {
+    WindowField &force = readable.find("force")->second;
+    state(force, *scheme_, balance_);
+    check_restored(force.start.size(), n_values_);
+  }
+
   void add_totals(const WindowTotals &totals, Statistics &statistics) override {
     balance_.add_solid(totals, statistics);
   }
@@ -120,6 +129,7 @@ private:
                               [&](PayloadReader &read) {
                                 check_position(read, window, iteration);
                                 fluid_failure_ = read.text();
+                                fluid_wants_to_stop_ = read.number() != 0;
                                 auto values = read_values(read, n_values_);
                                 totals = read_totals(read);
                                 return values;
@@ -135,6 +145,9 @@ private:
     payload.number(static_cast<std::uint64_t>(verdict));
     if (verdict == Verdict::failed || verdict == Verdict::retry)
       payload.text(reason.substr(0, longest_text / 2));
+    stops_here = verdict == Verdict::converged && (exchange.wants_to_stop || fluid_wants_to_stop_);
+    if (verdict == Verdict::converged)
+      payload.number(stops_here);
     if (verdict != Verdict::failed)
       write_iterate(payload, verdict);
     exchange.link.send(FrameType::iterate, std::move(payload));
@@ -181,7 +194,8 @@ private:
   std::optional<Scheme> scheme_;
   MapReport report_;
   std::size_t n_values_ = 0;
-  std::string fluid_failure_; // of the forces last received
+  std::string fluid_failure_;        // of the forces last received
+  bool fluid_wants_to_stop_ = false; // at the end of their window
 };
 
 } // namespace
