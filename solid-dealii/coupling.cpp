@@ -2,9 +2,12 @@
 #include "solid-dealii/coupling.hpp"
 
 #include "bridge/base/progress.hpp"
+#include "bridge/base/restart_files.hpp"
+#include "bridge/base/stop_signal.hpp"
 #include "bridge/participant.hpp"
 #include "bridge/run_summary.hpp"
 #include "solid-dealii/history.hpp"
+#include "solid-dealii/state_file.hpp"
 
 #include <nlohmann/json.hpp>
 
@@ -28,11 +31,21 @@ public:
         state_(solver_.initial_state()),
         forces_(static_cast<std::size_t>(surface_.mesh.dim * surface_.n_nodes())) {}
 
+  /// Goes on from the end of a window of another run.
+  void restore(bridge::Participant &bridge, const std::filesystem::path &file) {
+    SavedState saved = read_state(file, state_);
+    check(!saved.bridge.empty(), "{}: not the restart file of a coupled run", file.string());
+    bridge.restore(saved.bridge);
+    state_ = std::move(saved.state);
+    start_time_ = saved.time;
+  }
+
   void coupled(bridge::Participant &bridge) {
     bridge.set_mesh(surface_.mesh);
     bridge.initialize();
     // Only now: a partner that never comes must not cost the series of an earlier run.
-    history_.emplace(solver_, folder_, output_interval_);
+    history_.emplace(solver_, folder_, output_interval_, &state_, start_time_);
+    const StopSignal stop_signal;
     while (bridge.is_coupling_ongoing()) {
       if (bridge.iteration() == 1) {
         start_ = state_;
@@ -42,15 +55,22 @@ public:
       read_forces(bridge, dt);
       state_ = solver_.advance(start_, load_, dt, guess_ ? &*guess_ : nullptr);
       write_motion(bridge);
+      if (stop_signal.has_come())
+        bridge.request_stop();
       bridge.advance(dt);
       if (bridge.requires_reading_checkpoint()) {
         guess_ = state_; // the next iterate is near: only its Newton iterations are saved
         state_ = start_;
       } else if (bridge.is_time_window_complete()) {
         finish_window(bridge);
+        if (bridge.requires_writing_restart())
+          write_restart(bridge);
       }
     }
     bridge.finalize();
+    check(!bridge.is_stopped(),
+          "stopped at t = {:.6g} s, as it was told to; sluice run --restart {} goes on from there",
+          bridge.time(), folder_.string());
   }
 
   /// Nothing before the partner was met.
@@ -60,6 +80,12 @@ public:
   }
 
 private:
+  void write_restart(const bridge::Participant &bridge) const {
+    write_state(restart_file(folder_, "solid", bridge.time_window() - 1),
+                {state_, bridge.time(), bridge.saved_state()});
+    remove_older_restart_files(folder_, "solid");
+  }
+
   void read_forces(const bridge::Participant &bridge, double relative_time) {
     bridge.read_data("force", relative_time, forces_);
     load_ = surface_.scatter(forces_, solver_.discretisation().n_dofs());
@@ -85,6 +111,7 @@ private:
   Interface<dim> surface_;
   std::optional<History<dim>> history_;
   Progress progress_;
+  double start_time_ = 0;           // [s]
   SolidState state_, start_;        // now, and at the start of the window
   std::optional<SolidState> guess_; // the last iterate of the same window
   std::vector<double> forces_;
@@ -93,8 +120,10 @@ private:
 
 template <int dim>
 void run_in(bridge::Participant &bridge, const SolidParams &params,
-            const std::filesystem::path &folder) {
+            const std::filesystem::path &folder, const std::filesystem::path &restart) {
   Run<dim> run(params, bridge.case_settings(), folder);
+  if (!restart.empty())
+    run.restore(bridge, restart);
   try {
     run_coupled(bridge, [&] { run.coupled(bridge); });
   } catch (const std::exception &error) {
@@ -106,17 +135,19 @@ void run_in(bridge::Participant &bridge, const SolidParams &params,
 
 } // namespace
 
-void run(bridge::Participant &bridge, const Config &config, const std::filesystem::path &folder) {
+void run(bridge::Participant &bridge, const Config &config, const std::filesystem::path &folder,
+         const std::filesystem::path &restart) {
   const auto params = read_params(config);
   if (params.dimension == 2)
-    run_in<2>(bridge, params, folder);
+    run_in<2>(bridge, params, folder, restart);
   else
-    run_in<3>(bridge, params, folder);
+    run_in<3>(bridge, params, folder, restart);
 }
 
-void run(const Config &config, const std::filesystem::path &folder) {
+void run(const Config &config, const std::filesystem::path &folder,
+         const std::filesystem::path &restart) {
   bridge::Participant bridge("solid", config, folder);
-  run(bridge, config, folder);
+  run(bridge, config, folder, restart);
 }
 
 } // namespace sluice::solid

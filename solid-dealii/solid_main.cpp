@@ -34,7 +34,7 @@ void run(const Options &options) {
   if (!options.task.empty())
     return solid::run_alone(options.task, config, options.water, options.out, options.restart);
   std::filesystem::create_directories(options.out);
-  solid::run(config, options.out);
+  solid::run(config, options.out, options.restart);
 }
 
 } // namespace
@@ -50,7 +50,7 @@ int main(int argc, char **argv) {
   app.add_option("--alone", options.task,
                  "without a partner, under its own load or still water: static, modes or release");
   app.add_option("--restart", options.restart,
-                 "with --alone release: go on from this solid_state.h5");
+                 "go on from this restart file; with --alone release: from this solid_state.h5");
   app.add_option("--water-level", options.water.level, "[m] of that water")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   try {

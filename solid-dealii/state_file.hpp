@@ -9,14 +9,17 @@
 
 #include "solid-dealii/solid_state.hpp"
 
+#include <cstddef>
 #include <filesystem>
+#include <vector>
 
 namespace sluice::solid {
 
 /// A state and the moment it belongs to.
 struct SavedState {
   SolidState state;
-  double time = 0; ///< [s]
+  double time = 0;               ///< [s]
+  std::vector<std::byte> bridge{}; ///< of the participant, in the restart file of a coupled run
 };
 
 /// Writes the file whole or not at all: under another name first, which is then changed.
