@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // A program that is killed or stopped at any point of the conversation, before a frame or in the
-// middle of one, or sends one whose header is damaged or of another version: its partner ends within
-// the deadline and says what it was waiting for, and so does the program itself if it lives.
+// middle of one, or sends one whose header is damaged or of another version: its partner ends
+// within the deadline and says what it was waiting for, and so does the program itself if it lives.
 #include "bridge/base/timer.hpp"
 #include "bridge/message.hpp"
 #include "bridge/transport_socket.hpp"
