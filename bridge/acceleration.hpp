@@ -21,6 +21,7 @@ public:
   }
   void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, double) {}
   void forget_window() {}
+  template <class Archive> void archive(Archive &) {} // nothing but its setting
 
 private:
   double relaxation_;

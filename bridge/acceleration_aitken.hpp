@@ -25,6 +25,7 @@ public:
   void finish_window(const Eigen::VectorXd &, const Eigen::VectorXd &, double = 0);
   /// The window starts anew, with the first factor of all.
   void forget_window();
+  template <class Archive> void archive(Archive &a) { a(relaxation_, last_residual_); }
 
 private:
   double initial_relaxation_, relaxation_;

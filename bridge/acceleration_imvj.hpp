@@ -29,10 +29,14 @@ public:
                      double resolution = 0);
   /// The window starts anew: what it taught so far is dropped.
   void forget_window();
+  template <class Archive> void archive(Archive &a) {
+    a(windows_, columns_, last_residual_, last_solved_);
+  }
 
 private:
   struct Column {
     Eigen::VectorXd residual_change, solution_change;
+    template <class Archive> void archive(Archive &a) { a(residual_change, solution_change); }
   };
   void remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved, double resolution);
   Eigen::VectorXd before(const Eigen::VectorXd &residual) const; // -J_before r

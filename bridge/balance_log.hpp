@@ -17,6 +17,7 @@ namespace sluice::bridge {
 struct WindowTotals {
   long window = 0;
   InterfaceTotals totals;
+  template <class Archive> void archive(Archive &a) { a(window, totals); }
 };
 void write_totals(PayloadWriter &write, const std::optional<WindowTotals> &totals);
 std::optional<WindowTotals> read_totals(PayloadReader &read);
@@ -27,6 +28,8 @@ public:
   /// A window is compared as soon as both sides have reported it; the file appears with the first.
   void add_fluid(const WindowTotals &totals, Statistics &statistics);
   void add_solid(const WindowTotals &totals, Statistics &statistics);
+  /// The reports that wait for the other side's.
+  template <class Archive> void archive(Archive &a) { a(fluid_, solid_); }
 
 private:
   void compare(long window, const InterfaceTotals &fluid, const InterfaceTotals &solid,

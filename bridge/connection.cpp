@@ -16,21 +16,10 @@ constexpr std::size_t largest_hello = 4096;         // [bytes] from a stranger, 
 constexpr std::size_t largest_case_text = 16 << 20; // [bytes]
 constexpr double stranger_patience = 5;             // [s] for a connection that does not speak
 
-struct Hello {
-  std::string token, role;
-};
-
 void send_hello(Link &link, Role self, const std::string &token) {
   PayloadWriter payload;
   payload.text(token).text(name_of(self));
   link.send(FrameType::hello, std::move(payload));
-}
-
-Hello receive_hello(Link &link) {
-  return link.receive(FrameType::hello, largest_hello,
-                      fmt::format("the {}'s greeting", link.partner()), [](PayloadReader &read) {
-                        return Hello{read.text(), read.text()};
-                      });
 }
 
 // Looks at every character whatever the first ones are, so that the time taken tells nothing.
@@ -41,27 +30,22 @@ bool is_same_secret(const std::string &a, const std::string &b) {
   return difference == 0;
 }
 
-void check_hello(const Hello &hello, Role self, const std::string &token) {
+// The token first: of a stranger nothing but the header, of fixed size, is read before it, and
+// nothing after it.
+void receive_hello(Link &link, Role self, const std::string &token) {
   const std::string partner = name_of(partner_of(self));
-  check(
-      is_same_secret(hello.token, token),
-      "bridge: the {} showed a wrong token to the {}; both programs need the same bridge.token (or "
-      "SLUICE_TOKEN)",
-      partner, name_of(self));
-  check(hello.role == partner,
-        "bridge: the {} met another {} instead of the {}; start one program of each", name_of(self),
-        hello.role, partner);
-}
-
-// Refuses aloud: the other end's user sees the reason too.
-void check_partner(Link &link, Role self, const std::string &token) {
-  const Hello hello = receive_hello(link);
-  try {
-    check_hello(hello, self, token);
-  } catch (const UserError &error) {
-    link.send_abort(error.what());
-    throw;
-  }
+  link.receive(FrameType::hello, largest_hello, fmt::format("the {}'s greeting", link.partner()),
+               [&](PayloadReader &read) {
+                 check(is_same_secret(read.text(), token),
+                       "bridge: the {} showed a wrong token to the {}; both programs need the same "
+                       "bridge.token (or SLUICE_TOKEN)",
+                       partner, name_of(self));
+                 const std::string role = read.text();
+                 check(role == partner,
+                       "bridge: the {} met another {} instead of the {}; start one program of each",
+                       name_of(self), role, partner);
+                 return role;
+               });
 }
 
 std::unique_ptr<Link> make_link(Role role, const BridgeSettings &settings,
@@ -70,13 +54,19 @@ std::unique_ptr<Link> make_link(Role role, const BridgeSettings &settings,
                                 settings.silence_deadline);
 }
 
+// Refuses aloud: the other end's user sees the reason too.
 void greet(Role role, Link &link, const std::string &token, Deadline deadline) {
-  link.distrust(deadline);
-  if (role == Role::solid)
-    send_hello(link, role, token);
-  check_partner(link, role, token);
-  if (role == Role::fluid)
-    send_hello(link, role, token);
+  link.distrust(deadline, role == Role::fluid ? LastWords::unheard : LastWords::heard);
+  try {
+    if (role == Role::solid)
+      send_hello(link, role, token);
+    receive_hello(link, role, token);
+    if (role == Role::fluid)
+      send_hello(link, role, token);
+  } catch (const UserError &error) {
+    link.send_abort(error.what());
+    throw;
+  }
   link.trust();
 }
 
@@ -139,10 +129,11 @@ std::vector<std::string> lines_of(const std::string &text) {
   const auto line = [&](const std::vector<std::string> &lines) {
     return k < lines.size() ? fmt::format("'{}'", lines[k]) : std::string("nothing more");
   };
-  fail(
-      "bridge: the two programs read different case files (or got different --set options): the {} "
-      "has {}, the {} has {}",
-      name_of(self), line(a), name_of(partner_of(self)), line(b));
+  fail("bridge: the two programs read different case files (or got different --set options, or "
+       "restart "
+       "files of different windows): the {} "
+       "has {}, the {} has {}",
+       name_of(self), line(a), name_of(partner_of(self)), line(b));
 }
 
 void send_case(Link &link, const std::string &text) {

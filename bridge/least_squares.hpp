@@ -18,6 +18,7 @@ public:
   /// W alpha with alpha = argmin |V alpha + r|.
   Eigen::VectorXd correction(const Eigen::VectorXd &r) const;
   Eigen::Index columns() const { return static_cast<Eigen::Index>(q_.size()); }
+  template <class Archive> void archive(Archive &a) { a(q_, r_, w_); }
 
 private:
   std::vector<Eigen::VectorXd> q_; // orthonormal

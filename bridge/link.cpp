@@ -133,7 +133,7 @@ void Link::receive_frame(FrameType expected, std::size_t limit, const Awaited &a
 FrameHeader Link::next_header(FrameType expected, std::size_t limit, const Awaited &awaited) {
   while (true) {
     const FrameHeader header = read_header();
-    if (header.type == FrameType::abort)
+    if (header.type == FrameType::abort && hears_last_words_)
       report_abort(header, "awaited " + awaited.text());
     const bool is_expected = header.type == expected;
     if (!is_expected && (header.type != FrameType::heartbeat || greeting_deadline_))
@@ -205,7 +205,7 @@ void Link::report_loss(std::string_view activity, std::string_view reason) {
   try {
     while (true) {
       const FrameHeader header = read_header();
-      if (header.type == FrameType::abort)
+      if (header.type == FrameType::abort && hears_last_words_)
         report_abort(header, activity);
       for (std::uint64_t left = header.length; left > 0;) {
         std::array<std::byte, inbox_size> unread;

@@ -35,6 +35,10 @@ struct Awaited {
   double start = 0; // [s] of the window
 };
 
+/// Whether a partner that is not trusted yet may say why it gives up: the one that was called upon
+/// may, whoever knocks has to show its token first.
+enum class LastWords { heard, unheard };
+
 class Link : private ByteSource {
 public:
   /// `self` and `partner` are the roles ("fluid", "solid"); `silence_deadline` [s] bounds the time
@@ -47,8 +51,14 @@ public:
 
   /// Whatever trickles in, every wait ends by `deadline`, and a heartbeat is no greeting: for a
   /// connection that may be a stranger's. Until `trust`.
-  void distrust(Deadline deadline) { greeting_deadline_ = deadline; }
-  void trust() { greeting_deadline_.reset(); }
+  void distrust(Deadline deadline, LastWords last_words) {
+    greeting_deadline_ = deadline;
+    hears_last_words_ = last_words == LastWords::heard;
+  }
+  void trust() {
+    greeting_deadline_.reset();
+    hears_last_words_ = true;
+  }
 
   /// From now on a thread sends a heartbeat five times per silence deadline (once a second at
   /// least), whatever this side computes.
@@ -94,6 +104,7 @@ private:
   std::string self_, partner_;
   double silence_deadline_;
   std::optional<Deadline> greeting_deadline_;
+  bool hears_last_words_ = true;
   double wait_s_ = 0;
   std::atomic<std::uint64_t> bytes_sent_ = 0; // by both threads
   std::uint64_t bytes_received_ = 0;

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace sluice::bridge {
 
@@ -166,11 +167,18 @@ private:
 
 Mapping rbf_map(const InterfaceMesh &fluid, const InterfaceMesh &solid) {
   check_dimensions(fluid, solid);
-  check_faces(solid, "solid");
-  const FaceTree faces(solid);
+  const std::optional<FaceTree> faces =
+      solid.n_faces() > 0 ? std::optional<FaceTree>(std::in_place, solid) : std::nullopt;
+  const NodeTree nodes(solid);
   MapReport report;
   for (std::size_t i = 0; i < fluid.n_nodes(); ++i)
-    note(i, project(fluid, i, faces, solid), report);
+    note(i,
+         faces ? project(fluid, i, *faces, solid)
+               : ProjectedNode{0,
+                               {},
+                               std::sqrt(nodes.nearest(fluid.point(i), 1).front().distance_squared),
+                               false},
+         report);
   const Mapping::Matrix matrix = Blend(fluid, solid).matrix();
   return {fluid, solid, with_linear_reproduction(matrix, fluid, solid), report};
 }

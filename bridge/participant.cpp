@@ -6,13 +6,50 @@
 #include "bridge/transport.hpp"
 
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <sstream>
 #include <utility>
 
 namespace sluice::bridge {
+
+namespace {
+
+// The lines of the case that the saved state rests on: not where the two meet, nor how long one
+// waits, nor when the run ends.
+std::string text_that_must_stay(const std::string &case_text) {
+  std::istringstream in(case_text);
+  std::string kept;
+  for (std::string line; std::getline(in, line);) {
+    const std::string key = line.substr(0, line.find(' '));
+    constexpr std::array free{"bridge.transport", "bridge.address", "bridge.connect_deadline_s",
+                              "bridge.silence_deadline_s", "bridge.restart_every_windows"};
+    if ((key.starts_with("bridge.") || key == "case.time_step_s") &&
+        std::find(free.begin(), free.end(), key) == free.end())
+      kept += line + '\n';
+  }
+  return kept;
+}
+
+void check_same_coupling(const std::string &before, const std::string &now) {
+  std::istringstream a(before), b(now);
+  while (true) {
+    std::string was, is;
+    const bool was_there = static_cast<bool>(std::getline(a, was));
+    const bool is_there = static_cast<bool>(std::getline(b, is));
+    if (!was_there && !is_there)
+      return;
+    check(was == is,
+          "bridge: the restart file was written by a run with '{}', this one has '{}'; a run goes "
+          "on with the coupling that it began with",
+          was.empty() ? "nothing more" : was, is.empty() ? "nothing more" : is);
+  }
+}
+
+} // namespace
 
 class Participant::Impl {
 public:
@@ -56,18 +93,60 @@ public:
     link = transport ? greet_partner(role, settings, std::move(transport))
                      : connect_to_partner(role, settings, out_dir);
     link->start_heartbeat();
-    compare_cases(role, *link, case_text);
+    compare_cases(role, *link, case_text + start_line());
     partner_mesh = side->initialize(*link, mesh);
+    if (!saved.empty())
+      restore_side();
     side->await_window(exchange());
   }
 
+  // Last in what the two sides compare at connect.
+  std::string start_line() const {
+    return saved.empty() ? "start = first window"
+                         : fmt::format("start = after window {} (restart)", clock.window() - 1);
+  }
+
+  /// Beside what the two sides of the bridge save by themselves.
+  template <class Archive> void archive(Archive &state) {
+    state(clock, statistics, totals, length_before);
+  }
+  std::vector<std::byte> saved_state() {
+    StateWriter state;
+    std::string name = name_of(role), text = text_that_must_stay(case_text);
+    state(name, text);
+    archive(state);
+    side->save(state);
+    return state.bytes();
+  }
+  void restore(std::span<const std::byte> bytes) {
+    check(!link, "bridge: restore comes before initialize");
+    saved.assign(bytes.begin(), bytes.end());
+    StateReader state = begin_reading();
+    archive(state);
+  }
+  void restore_side() {
+    StateReader state = begin_reading();
+    archive(state);
+    side->restore(state);
+    state.finish();
+  }
+  StateReader begin_reading() const {
+    StateReader state(saved);
+    std::string name, text;
+    state(name, text);
+    check(name == name_of(role), "bridge: the {} was given the {}'s restart file", name_of(role),
+          name);
+    check_same_coupling(text, text_that_must_stay(case_text));
+    return state;
+  }
+
   void advance(double dt) {
-    check(link && !clock.is_over(), "bridge: advance outside the coupled run");
+    check(link && is_ongoing(), "bridge: advance outside the coupled run");
     check(std::isfinite(dt) && dt > 0 && dt <= clock.left() * (1 + 1e-9),
           "bridge: a step of {} s, where {} s of window {} are left", dt, clock.left(),
           clock.window());
     enter_window();
-    is_complete = is_rejected = false;
+    is_complete = is_rejected = must_write_restart = false;
     if (!clock.step(dt))
       return;
     clock.restart_window();
@@ -89,7 +168,11 @@ public:
     iteration = 1;
     length_before = clock.window_length();
     clock.next_window();
-    must_enter_window = !clock.is_over();
+    is_stopped = side->stops_here && !clock.is_over();
+    must_enter_window = is_ongoing();
+    const bool is_due = settings.restart_every > 0 &&
+                        ((clock.window() - 1) % settings.restart_every == 0 || clock.is_over());
+    must_write_restart = is_stopped || is_due;
   }
   // Not in the advance before: a partner that dies in this window must not cost the last one, which
   // the caller has not seen as complete yet.
@@ -113,7 +196,10 @@ public:
     ++iteration;
   }
 
-  Exchange exchange() { return {*link, clock, statistics, iteration, totals, failure}; }
+  bool is_ongoing() const { return !clock.is_over() && !is_stopped; }
+  Exchange exchange() {
+    return {*link, clock, statistics, iteration, totals, failure, wants_to_stop};
+  }
 
   Role role;
   std::string case_text;
@@ -133,6 +219,9 @@ public:
   bool is_complete = false;
   bool is_rejected = false;
   bool must_enter_window = false;
+  std::vector<std::byte> saved; // of the run that this one goes on from
+  bool must_write_restart = false;
+  bool wants_to_stop = false, is_stopped = false;
   bool is_silent = false; // goodbye or abort said
 };
 
@@ -157,7 +246,23 @@ void Participant::initialize() {
   impl_->statistics.initialize_s = watch.seconds();
 }
 
-bool Participant::is_coupling_ongoing() const { return !impl_->clock.is_over(); }
+bool Participant::is_coupling_ongoing() const { return impl_->is_ongoing(); }
+bool Participant::is_stopped() const { return impl_->is_stopped; }
+bool Participant::requires_writing_restart() const { return impl_->must_write_restart; }
+void Participant::request_stop() { impl_->wants_to_stop = true; }
+
+std::vector<std::byte> Participant::saved_state() const {
+  check(impl_->is_complete, "bridge: saved_state follows an advance that completed a window");
+  return impl_->saved_state();
+}
+
+void Participant::restore(std::span<const std::byte> saved) {
+  try {
+    impl_->restore(saved);
+  } catch (const MalformedMessage &error) {
+    fail("bridge: the state of the bridge in the restart file is damaged: {}", error.what());
+  }
+}
 bool Participant::is_time_window_complete() const { return impl_->is_complete; }
 double Participant::max_time_step_size() const { return impl_->clock.left(); }
 
@@ -244,7 +349,7 @@ void Participant::write_data(std::string_view field, std::span<const double> val
 
 void Participant::report_failure(std::string_view reason) {
   impl_->told([&] {
-    check(impl_->link && !impl_->clock.is_over(), "bridge: report_failure outside the coupled run");
+    check(impl_->link && impl_->is_ongoing(), "bridge: report_failure outside the coupled run");
     impl_->fail_window(std::string(reason));
   });
 }
@@ -277,7 +382,7 @@ void Participant::advance(double dt) {
 void Participant::finalize() {
   impl_->told([&] {
     check(impl_->link != nullptr, "bridge: finalize without initialize");
-    check(impl_->clock.is_over(), "bridge: the {} ended its run at t = {:.6g} s, before the end",
+    check(!impl_->is_ongoing(), "bridge: the {} ended its run at t = {:.6g} s, before the end",
           name_of(impl_->role), time());
     impl_->side->finalize(impl_->exchange());
   });

@@ -40,6 +40,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace sluice::bridge {
 
@@ -62,6 +63,11 @@ public:
   /// The coupled surface in the reference configuration. Once, before initialize. Throws UserError
   /// on an unusable mesh.
   void set_mesh(InterfaceMesh mesh);
+  /// Before initialize: this side goes on from `saved`, which `saved_state` gave in an earlier run;
+  /// the solver's own state is the caller's. Throws UserError for the state of another role, of
+  /// other coupling settings, or damaged; initialize throws where the partner goes on from another
+  /// window.
+  void restore(std::span<const std::byte> saved);
   /// Connects (either program may start first), compares the case files, exchanges the meshes,
   /// builds the map, exchanges initial data: write_data before this call sets it, else it is zero.
   /// The solid's call returns when the fluid's first forces are there.
@@ -78,6 +84,17 @@ public:
   /// True after an advance whose iteration did not converge, or whose window is tried again at half
   /// its length (then iteration() is 1): go back to the window's start.
   bool requires_reading_checkpoint() const;
+
+  /// True after an advance that completed a window at whose end both sides write a restart file:
+  /// every bridge.restart_every_windows windows and at the end of such a run, and where one side
+  /// was told to stop. After report_totals.
+  bool requires_writing_restart() const;
+  /// All that this side's next bits depend on, at the end of a window; for the restart file.
+  std::vector<std::byte> saved_state() const;
+  /// Both sides write a restart file and stop at the end of this window or the next.
+  void request_stop();
+  /// True once they have: the coupling is over before the end time.
+  bool is_stopped() const;
 
   /// Own field at the end of this step. Throws UserError for a wrong size, a field that this side
   /// does not write, or a value that is not finite (naming node and value; where

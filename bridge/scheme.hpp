@@ -28,6 +28,7 @@ namespace sluice::bridge {
 struct InterfaceState {
   Eigen::VectorXd displacement; ///< [m]
   Eigen::VectorXd velocity;     ///< [m/s]; may be empty
+  template <class Archive> void archive(Archive &a) { a(displacement, velocity); }
 };
 
 /// The same where it lies.
@@ -76,6 +77,12 @@ public:
     return force_;
   } ///< parallel: what the solid computes with
   std::string explanation(const IterationRecord &record) const; ///< of a failure, with numbers
+
+  /// Between two windows: all that the next ones depend on.
+  template <class Archive> void archive(Archive &a) {
+    a(acceleration_, force_scale_, largest_force_, accepted_, iterate_, force_, accepted_force_,
+      velocity_before_, dt_before_);
+  }
 
 private:
   IterationRecord judge(const InterfaceView &solved, const Force &force);

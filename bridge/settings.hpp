@@ -60,6 +60,7 @@ struct BridgeSettings {
   int windows_to_grow = 4;              ///< accepted before a halved length doubles
   int windows_reused = 8;               ///< by the quasi-Newton methods
   double filter = 1e-2;                 ///< of quasi-Newton columns that repeat newer ones
+  int restart_every = 0;                ///< windows between restart files; 0: none
   double initial_relaxation = 0.05;     ///< of the first iteration without history
 
   template <class Reader> void describe(Reader &read) {
@@ -105,6 +106,9 @@ struct BridgeSettings {
          "how often a window that fails is halved and tried again; 0: the run ends")
         .at_least(0)
         .at_most(20);
+    read("restart_every_windows", restart_every,
+         "windows between restart files; 0: only when the run is told to stop")
+        .at_least(0);
     read("windows_to_grow", windows_to_grow, "windows accepted before a halved length doubles")
         .at_least(1);
     read("windows_reused", windows_reused, "earlier windows whose history quasi-Newton keeps")

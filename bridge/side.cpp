@@ -52,6 +52,15 @@ void check_position(PayloadReader &read, long window, int iteration) {
                     there_iteration, window, iteration));
 }
 
+// Fields are read in place and mapped in place: every one of them must fit.
+void check_restored(const WindowField &field, std::size_t n_needed) {
+  for (const std::vector<double> *values : {&field.start, &field.end, &field.before})
+    check(values->size() == n_needed || (values == &field.before && values->empty()),
+          "bridge: the restart file holds {} values on the interface, its mesh now needs {}; mesh "
+          "and spacing must be those of the run that wrote it",
+          values->size(), n_needed);
+}
+
 void write_report(PayloadWriter &write, const MapReport &report) {
   for (const auto count : {report.fluid_nodes, report.solid_nodes, report.fluid_nodes_beyond,
                            report.solid_nodes_reached, report.farthest_node})

@@ -9,6 +9,7 @@
 #include "bridge/link.hpp"
 #include "bridge/mapping.hpp"
 #include "bridge/scheme.hpp"
+#include "bridge/state_archive.hpp"
 #include "bridge/window_clock.hpp"
 
 #include <map>
@@ -28,6 +29,7 @@ struct WindowField {
     before.swap(start);
     start.resize(before.size());
   }
+  template <class Archive> void archive(Archive &a) { a(start, end, before); }
 };
 
 /// What both sides know of the run at an exchange.
@@ -38,6 +40,7 @@ struct Exchange {
   int iteration;                             ///< of this window, from 1
   const std::optional<WindowTotals> &totals; ///< own report of the window before
   const std::string &failure; ///< why this side could not do the window; "" if it did
+  bool wants_to_stop = false; ///< this side, at the end of the window
 };
 
 class Side {
@@ -51,11 +54,16 @@ public:
   /// At the end of an iteration; throws UserError for a window that fails for good.
   virtual Verdict advance(const Exchange &exchange) = 0;
   virtual void finalize(const Exchange &exchange) = 0;
+  /// Between two windows: all that the next ones depend on; back again after initialize. Throws
+  /// UserError for the state of another mesh.
+  virtual void save(StateWriter &state) = 0;
+  virtual void restore(StateReader &state) = 0;
   virtual void add_totals(const WindowTotals &, Statistics &) {}
   virtual const MapReport &map_report() const = 0;
 
   std::map<std::string, WindowField, std::less<>> readable;
   std::map<std::string, std::vector<double>, std::less<>> writable;
+  bool stops_here = false; ///< agreed by both at the end of a window
 };
 
 std::unique_ptr<Side> make_fluid_side(const BridgeSettings &settings);
@@ -75,6 +83,8 @@ InterfaceMesh receive_mesh(Link &link);
 /// programs are not at the same one.
 void write_position(PayloadWriter &write, const Exchange &exchange);
 void check_position(PayloadReader &read, long window, int iteration);
+/// Throws UserError where a restored field has another size than the mesh at hand.
+void check_restored(const WindowField &field, std::size_t n_needed);
 /// As the report is sent: the fluid builds the map, the solid learns what it looks like.
 void write_report(PayloadWriter &write, const MapReport &report);
 MapReport read_report(PayloadReader &read);

@@ -11,6 +11,7 @@ namespace {
 struct Answer {
   Verdict verdict = Verdict::iterate;
   std::string explanation; // of a failure, or of a window that is tried again
+  bool stops_here = false; // the window was the run's last for now
 };
 
 MapKind kind_of(const std::string &mapping) {
@@ -68,6 +69,7 @@ public:
       ++exchange.statistics.failed_windows;
       throw UserError(answer.explanation);
     }
+    stops_here = answer.stops_here;
     exchange.statistics.halved_windows += answer.verdict == Verdict::retry;
     return answer.verdict;
   }
@@ -78,6 +80,18 @@ public:
     exchange.link.send(FrameType::goodbye, std::move(payload));
     exchange.link.receive(FrameType::goodbye, record_limit(0), "the solid's goodbye",
                           [](PayloadReader &) { return 0; });
+  }
+
+  void save(StateWriter &state) override {
+    for (auto &[name, field] : readable)
+      state(field);
+  }
+  void restore(StateReader &state) override {
+    for (auto &[name, field] : readable) {
+      const std::size_t needed = field.start.size();
+      state(field);
+      check_restored(field, needed);
+    }
   }
 
   const MapReport &map_report() const override { return map_.report(); }
@@ -93,7 +107,7 @@ private:
   void send_forces(const Exchange &exchange) {
     PayloadWriter payload;
     write_position(payload, exchange);
-    payload.text(exchange.failure);
+    payload.text(exchange.failure).number(exchange.wants_to_stop);
     payload.borrowed(forces_on_solid());
     write_totals(payload, over_depth(exchange.totals, map_.depth()));
     exchange.link.send(FrameType::forces, std::move(payload));
@@ -143,8 +157,10 @@ private:
       answer.explanation = read.text();
     if (answer.verdict == Verdict::failed)
       return answer;
-    if (answer.verdict == Verdict::converged)
+    if (answer.verdict == Verdict::converged) {
+      answer.stops_here = read.number() != 0;
       read_accepted(read);
+    }
     read_motion(read, &WindowField::end);
     return answer;
   }

@@ -80,6 +80,15 @@ public:
     exchange.link.send(FrameType::goodbye, PayloadWriter());
   }
 
+  void save(StateWriter &state) override {
+    state(readable.find("force")->second, *scheme_, balance_);
+  }
+  void restore(StateReader &state) override {
+    WindowField &force = readable.find("force")->second;
+    state(force, *scheme_, balance_);
+    check_restored(force, n_values_);
+  }
+
   void add_totals(const WindowTotals &totals, Statistics &statistics) override {
     balance_.add_solid(totals, statistics);
   }
@@ -155,6 +164,7 @@ private:
                               [&](PayloadReader &read) {
                                 check_position(read, window, iteration);
                                 fluid_failure_ = read.text();
+                                fluid_wants_to_stop_ = read.number() != 0;
                                 read.reals(forces);
                                 return read_totals(read);
                               });
@@ -162,10 +172,14 @@ private:
       balance_.add_fluid(*totals, exchange.statistics);
   }
 
-  static PayloadWriter answer(const Exchange &exchange, Verdict verdict) {
+  // The head of the answer; a converged window may be the last for now.
+  PayloadWriter answer(const Exchange &exchange, Verdict verdict) {
     PayloadWriter payload;
     write_position(payload, exchange);
     payload.number(static_cast<std::uint64_t>(verdict));
+    stops_here = verdict == Verdict::converged && (exchange.wants_to_stop || fluid_wants_to_stop_);
+    if (verdict == Verdict::converged)
+      payload.number(stops_here);
     return payload;
   }
 
@@ -213,7 +227,8 @@ private:
   std::size_t n_values_ = 0;
   std::vector<double> computed_; // forces that the parallel schemes receive
   const std::vector<double> no_values_;
-  std::string fluid_failure_; // of the forces last received
+  std::string fluid_failure_;        // of the forces last received
+  bool fluid_wants_to_stop_ = false; // at the end of their window
 };
 
 } // namespace

@@ -19,6 +19,9 @@ struct InterfaceTotals {
   double moment_magnitude = 0;    ///< [N m]
   /// [J] of force times either displacement: their difference keeps the rounding of both
   double work_magnitude = 0;
+  template <class Archive> void archive(Archive &a) {
+    a(force, moment, work, force_magnitude, moment_magnitude, work_magnitude);
+  }
 };
 
 struct Statistics {
@@ -37,6 +40,11 @@ struct Statistics {
   double moment_balance_max = -1;
   double work_balance_max = -1;
 
+  /// What describes the run as a whole, also of one that goes on from another.
+  template <class Archive> void archive(Archive &a) {
+    a(windows, failed_windows, halved_windows, iterations, iterations_max, force_balance_max,
+      moment_balance_max, work_balance_max);
+  }
   double iterations_mean() const {
     return windows > 0 ? static_cast<double>(iterations) / static_cast<double>(windows) : 0;
   }

@@ -52,6 +52,8 @@ public:
     since_halved_ = 0;
     elapsed_ = 0;
   }
+  /// Between two windows.
+  template <class Archive> void archive(Archive &a) { a(tick_, span_, accepted_, since_halved_); }
 
 private:
   // A window of twice the length starts only where one of that length would stand.

@@ -2,6 +2,8 @@
 #include "fluid/coupling.hpp"
 
 #include "bridge/base/progress.hpp"
+#include "bridge/base/restart_files.hpp"
+#include "bridge/base/stop_signal.hpp"
 #include "bridge/participant.hpp"
 #include "bridge/run_summary.hpp"
 #include "bridge/settings.hpp"
@@ -81,10 +83,40 @@ private:
 template <int dim> struct Start {
   Scene<dim> scene;
   double time = 0;
+  std::vector<std::byte> bridge{}; // of the run that a coupled one goes on from
 };
 
 template <int dim> bool has_partner(const Scene<dim> &scene) {
   return !scene.walls.coupled_vertices.empty() && scene.params.coupled_walls == "move";
+}
+
+/// A state that fits the scene's spacing and its run's length.
+template <int dim>
+SavedState<dim> read_fitting_state(const std::filesystem::path &file, const Scene<dim> &scene,
+                                   const bridge::CaseSettings &settings) {
+  SavedState<dim> saved = read_state<dim>(file);
+  check(std::abs(saved.spacing - scene.params.spacing) <= 1e-12 * scene.params.spacing,
+        "{}: its points are {} m apart, fluid.spacing_m is {} m", file.string(), saved.spacing,
+        scene.params.spacing);
+  check(saved.time < settings.end_time,
+        "{}: its state is of t = {} s, the run ends at case.end_time_s = {}", file.string(),
+        saved.time, settings.end_time);
+  return saved;
+}
+
+/// The water and the bridge as a coupled run left them.
+template <int dim>
+Start<dim> restart_of(const Config &config, const bridge::CaseSettings &settings,
+                      const std::filesystem::path &file) {
+  Start<dim> start{.scene = read_scene<dim>(config, read_surface_file)};
+  SavedState<dim> saved = read_fitting_state(file, start.scene, settings);
+  check(has_partner(start.scene) && !saved.bridge.empty(),
+        "{}: restart files are of coupled runs; the fluid alone goes on from fluid.start_state",
+        file.string());
+  start.scene.initial = std::move(saved.state);
+  start.time = saved.time;
+  start.bridge = std::move(saved.bridge);
+  return start;
 }
 
 /// The water as filled, or as another run left it.
@@ -93,16 +125,11 @@ template <int dim> Start<dim> start_of(const Config &config, const bridge::CaseS
   const FluidParams<dim> &params = start.scene.params;
   if (params.start_state.empty())
     return start;
-  SavedState<dim> saved = read_state<dim>(params.start_state);
-  check(std::abs(saved.spacing - params.spacing) <= 1e-12 * params.spacing,
-        "{}: its points are {} m apart, fluid.spacing_m is {} m", params.start_state, saved.spacing,
-        params.spacing);
+  SavedState<dim> saved = read_fitting_state(params.start_state, start.scene, settings);
   check(!has_partner(start.scene),
-        "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s",
+        "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s; a "
+        "coupled run goes on with sluice run --restart",
         saved.time);
-  check(saved.time < settings.end_time,
-        "{}: its state is of t = {} s, the run ends at case.end_time_s = {}", params.start_state,
-        saved.time, settings.end_time);
   start.scene.initial = std::move(saved.state);
   check_clear_of_walls(start.scene, params.motion.wall_clearance * params.spacing);
   start.time = saved.time;
@@ -165,10 +192,12 @@ private:
 /// One step alone or one window with a partner.
 template <int dim> class Run {
 public:
-  Run(const Config &config, const std::filesystem::path &folder)
+  Run(const Config &config, const std::filesystem::path &folder,
+      const std::filesystem::path &restart)
       : settings_(config.read<bridge::CaseSettings>("case")),
-        start_(start_of<dim>(config, settings_)), solver_(start_.scene), folder_(folder),
-        progress_("fluid", settings_.end_time) {
+        start_(restart.empty() ? start_of<dim>(config, settings_)
+                               : restart_of<dim>(config, settings_, restart)),
+        solver_(start_.scene), folder_(folder), progress_("fluid", settings_.end_time) {
     check_folder(start_.scene.params, folder);
     note_volume_error(start_.scene);
   }
@@ -195,8 +224,12 @@ public:
   void coupled(bridge::Participant &bridge) {
     CoupledSurface<dim> surface(solver_.walls);
     bridge.set_mesh(surface.mesh(solver_.walls));
+    if (!start_.bridge.empty())
+      bridge.restore(start_.bridge);
     bridge.initialize();
+    surface.read_positions(bridge, 0, solver_.walls);
     open_history();
+    const StopSignal stop_signal;
     const bool repeats_steps = bridge.settings().iterate == "full";
     const bool may_halve = bridge.settings().max_halvings > 0;
     while (bridge.is_coupling_ongoing()) {
@@ -214,13 +247,9 @@ public:
         solver_.state = saved_;
       }
       surface.read_velocities(bridge, dt, solver_.walls);
-      if (is_first || repeats_step) {
-        surface.read_positions(bridge, dt, solver_.walls);
-        move_walls(start_.scene.prescribed, bridge.time(), dt, solver_.walls);
-        solver_.begin_step(dt);
-      }
-      solver_.iterate();
-      surface.write_forces(bridge, solver_);
+      iterate(bridge, surface, dt, is_first || repeats_step);
+      if (stop_signal.has_come())
+        bridge.request_stop();
       bridge.advance(dt);
       if (!bridge.is_time_window_complete())
         continue;
@@ -230,8 +259,13 @@ public:
           interface_totals(solver_, moved_from_, surface.displacement());
       bridge.report_totals(loads);
       finish_step(loads, bridge.time());
+      if (bridge.requires_writing_restart())
+        write_restart(bridge);
     }
     bridge.finalize();
+    check(!bridge.is_stopped(),
+          "stopped at t = {:.6g} s, as it was told to; sluice run --restart {} goes on from there",
+          bridge.time(), folder_.string());
   }
 
   void write_summary(const std::string &message, const nlohmann::json &bridge_summary) const {
@@ -241,9 +275,43 @@ public:
   bool has_partner() const { return fluid::has_partner(start_.scene); }
 
 private:
+  // A step that cannot be done at its length is the bridge's to cut; where it may not, it ends both
+  // programs with the reason.
+  void iterate(bridge::Participant &bridge, CoupledSurface<dim> &surface, double dt, bool moves) {
+    try {
+      if (moves) {
+        check_step(dt);
+        surface.read_positions(bridge, dt, solver_.walls);
+        move_walls(start_.scene.prescribed, bridge.time(), dt, solver_.walls);
+        solver_.begin_step(dt);
+      }
+      solver_.iterate();
+      surface.write_forces(bridge, solver_);
+    } catch (const NoStep &failure) {
+      bridge.report_failure(failure.what());
+    }
+  }
+
+  void check_step(double dt) const {
+    const auto [size, limit] =
+        limited_by_motion(solver_.state, solver_.walls, solver_.params(), settings_.time_step);
+    if (dt > size * (1 + 1e-9))
+      throw NoStep(fmt::format("step {}: {:.3g} s is longer than fluid.courant = {} allows "
+                               "({:.3g} s, {})",
+                               solver_.state.step + 1, dt, solver_.params().courant, size,
+                               step_limit_names[static_cast<std::size_t>(limit)]));
+  }
+
   // Only a run that really begins touches the files of an earlier one.
   void open_history() {
     history_.emplace(start_.scene, solver_, folder_, settings_.output_interval, start_.time);
+  }
+
+  void write_restart(const bridge::Participant &bridge) const {
+    write_state<dim>(
+        restart_file(folder_, "fluid", bridge.time_window() - 1),
+        {solver_.state, bridge.time(), solver_.params().spacing, bridge.saved_state()});
+    remove_older_restart_files(folder_, "fluid");
   }
 
   void finish_step(const bridge::InterfaceTotals &loads, double time) {
@@ -271,8 +339,10 @@ template <int dim> std::string describe(const Config &config) {
                      dim == 2 ? "segments" : "triangles");
 }
 
-template <int dim> void run(const Config &config, const std::filesystem::path &folder) {
-  Run<dim> run(config, folder);
+template <int dim>
+void run(const Config &config, const std::filesystem::path &folder,
+         const std::filesystem::path &restart) {
+  Run<dim> run(config, folder, restart);
   std::unique_ptr<bridge::Participant> bridge;
   const auto statistics = [&] {
     return bridge ? bridge::summary_of(bridge->statistics()) : nlohmann::json::object();
@@ -299,11 +369,12 @@ std::string describe(const Config &config) {
   return dimension_of(config) == 2 ? describe<2>(config) : describe<3>(config);
 }
 
-void run(const Config &config, const std::filesystem::path &folder) {
+void run(const Config &config, const std::filesystem::path &folder,
+         const std::filesystem::path &restart) {
   if (dimension_of(config) == 2)
-    run<2>(config, folder);
+    run<2>(config, folder, restart);
   else
-    run<3>(config, folder);
+    run<3>(config, folder, restart);
 }
 
 } // namespace sluice::fluid

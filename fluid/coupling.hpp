@@ -14,6 +14,8 @@ std::string describe(const Config &config);
 
 /// Runs the case to its end, writing into `folder`. Throws UserError on any failure, after the
 /// summary of what was computed has been written and the partner has been told.
-void run(const Config &config, const std::filesystem::path &folder);
+/// `restart`, unless empty: the restart file that a coupled run goes on from.
+void run(const Config &config, const std::filesystem::path &folder,
+         const std::filesystem::path &restart = {});
 
 } // namespace sluice::fluid

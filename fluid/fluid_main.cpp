@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: MIT
-// sluice-fluid CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--check]
+// sluice-fluid CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--check] [--restart FILE]
 #include "fluid/coupling.hpp"
 #include "fluid/parallel.hpp"
 
@@ -10,7 +10,7 @@
 namespace {
 
 struct Options {
-  std::string case_file, out = "out";
+  std::string case_file, out = "out", restart;
   std::vector<std::string> overrides;
   int threads = 0;
   bool check_only = false;
@@ -28,7 +28,7 @@ void run(const Options &options) {
     return;
   }
   std::filesystem::create_directories(options.out);
-  fluid::run(config, options.out);
+  fluid::run(config, options.out, options.restart);
 }
 
 } // namespace
@@ -40,6 +40,7 @@ int main(int argc, char **argv) {
   app.add_option("--set", options.overrides, "TABLE.KEY=VALUE overrides one value; repeatable")
       ->allow_extra_args(false);
   app.add_option("--out", options.out, "folder for all output")->capture_default_str();
+  app.add_option("--restart", options.restart, "restart file that a coupled run goes on from");
   app.add_option("--threads", options.threads, "threads; default: OMP_NUM_THREADS or all cores");
   app.add_flag("--check", options.check_only, "read everything, build the scene, stop");
   CLI11_PARSE(app, argc, argv);

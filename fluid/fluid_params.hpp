@@ -122,8 +122,8 @@ template <int dim> struct FluidParams {
         .at_least(1)
         .at_most(2);
     read("courant", courant,
-         "spacings that the fastest point may move in a step, which then is adapted; 0: always "
-         "case.time_step_s. For the fluid alone")
+         "spacings that the fastest point may move in a step, which then is adapted; with a partner "
+         "a longer window is halved (bridge.max_halvings). 0: always case.time_step_s")
         .at_least(0)
         .at_most(1);
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")

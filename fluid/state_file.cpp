@@ -89,6 +89,8 @@ public:
     expect(group.is_valid());
     for_each_array(saved.state.points,
                    [&](const char *name, const auto &x) { write_array(group, name, x); });
+    if (!saved.bridge.empty())
+      write_array(file_, "bridge", saved.bridge);
     expect(H5Fflush(file_, H5F_SCOPE_LOCAL) >= 0);
   }
 
@@ -149,6 +151,8 @@ public:
     for_each_array(saved.state.points,
                    [&](const char *name, auto &x) { read_array(group, name, x); });
     check_values(saved.state.points);
+    if (H5Lexists(file_, "bridge", H5P_DEFAULT) > 0)
+      read_bytes("bridge", saved.bridge);
     return saved;
   }
 
@@ -180,6 +184,16 @@ private:
             "{}: point {} has the surface mark {}, which does not exist", name_, i,
             static_cast<int>(points.at_surface[i]));
     }
+  }
+
+  void read_bytes(const char *name, std::vector<std::byte> &bytes) {
+    const Handle data(H5Dopen2(file_, name, H5P_DEFAULT), H5Dclose);
+    const Handle space(H5Dget_space(data), H5Sclose);
+    const hssize_t size = space.is_valid() ? H5Sget_simple_extent_npoints(space) : -1;
+    check(size >= 0, "{}: '{}' is damaged", name_, name);
+    bytes.resize(static_cast<std::size_t>(size));
+    check(H5Dread(data, H5T_NATIVE_UINT8, H5S_ALL, H5S_ALL, H5P_DEFAULT, bytes.data()) >= 0,
+          "{}: '{}' is damaged", name_, name);
   }
 
   template <class T> void read_array(hid_t group, const char *name, std::vector<T> &values) {

@@ -45,10 +45,11 @@ template <int dim> void FluidSolver<dim>::iterate() {
     options.null_space = problem_.has_open_point ? NullSpace::none : NullSpace::constants;
     return bicgstab(scaled_, problem_.source, points.pressure, multigrid_, options, memory_);
   });
-  check(result.converged,
-        "step {}: the pressure solve stopped after {} iterations at a residual of {:.2e} Pa; "
-        "reduce the time step",
-        state.step + 1, result.iterations, result.residual);
+  if (!result.converged)
+    throw NoStep(
+        fmt::format("step {}: the pressure solve stopped after {} iterations at a residual "
+                    "of {:.2e} Pa; reduce the time step",
+                    state.step + 1, result.iterations, result.residual));
   report_.pressure_iterations += result.iterations;
   ++report_.pressure_solves;
   timer("loads", [&] {

@@ -20,8 +20,8 @@ template <int dim> double fastest(const std::vector<Vec<dim>> &velocities) {
 } // namespace
 
 template <int dim>
-LimitedStep limited_step(const FluidState<dim> &state, const Walls<dim> &walls,
-                         const FluidParams<dim> &params, double largest) {
+LimitedStep limited_by_motion(const FluidState<dim> &state, const Walls<dim> &walls,
+                              const FluidParams<dim> &params, double largest) {
   LimitedStep step{largest, StepLimit::given};
   if (params.courant <= 0)
     return step;
@@ -34,11 +34,23 @@ LimitedStep limited_step(const FluidState<dim> &state, const Walls<dim> &walls,
     hold(params.courant * params.spacing / speed, StepLimit::courant);
   if (const double g = params.gravity.norm(); g > 0)
     hold(params.courant * std::sqrt(params.spacing / g), StepLimit::gravity);
-  if (state.step_size > 0)
-    hold(largest_growth * state.step_size, StepLimit::growth);
   return step;
 }
 
+template <int dim>
+LimitedStep limited_step(const FluidState<dim> &state, const Walls<dim> &walls,
+                         const FluidParams<dim> &params, double largest) {
+  const LimitedStep step = limited_by_motion(state, walls, params, largest);
+  const double grown = largest_growth * state.step_size;
+  if (params.courant > 0 && state.step_size > 0 && grown < step.size)
+    return {grown, StepLimit::growth};
+  return step;
+}
+
+template LimitedStep limited_by_motion(const FluidState<2> &, const Walls<2> &,
+                                       const FluidParams<2> &, double);
+template LimitedStep limited_by_motion(const FluidState<3> &, const Walls<3> &,
+                                       const FluidParams<3> &, double);
 template LimitedStep limited_step(const FluidState<2> &, const Walls<2> &, const FluidParams<2> &,
                                   double);
 template LimitedStep limited_step(const FluidState<3> &, const Walls<3> &, const FluidParams<3> &,

@@ -31,4 +31,9 @@ template <int dim>
 LimitedStep limited_step(const FluidState<dim> &state, const Walls<dim> &walls,
                          const FluidParams<dim> &params, double largest);
 
+/// The same without growth: what the motion alone allows, whatever the step before was.
+template <int dim>
+LimitedStep limited_by_motion(const FluidState<dim> &state, const Walls<dim> &walls,
+                              const FluidParams<dim> &params, double largest);
+
 } // namespace sluice::fluid

@@ -17,11 +17,14 @@ namespace sluice::solid {
 /// Runs the case to its end, writing into `folder` once the partner is met. Throws UserError on any
 /// failure, after the partner has been told and the summary of what was computed has been written.
 /// On several ranks all of them call it, and the root speaks to the partner.
-void run(const Config &config, const std::filesystem::path &folder, const Ranks &ranks = {});
+/// `restart`, unless empty: the restart file that the run goes on from; on several ranks each
+/// reads its own (state_file).
+void run(const Config &config, const std::filesystem::path &folder,
+         const std::filesystem::path &restart = {}, const Ranks &ranks = {});
 
 /// The same with a participant that is already made (tests: one that speaks to a thread); null on
 /// other ranks than the root.
 void run(bridge::Participant *bridge, const Config &config, const std::filesystem::path &folder,
-         const Ranks &ranks = {});
+         const std::filesystem::path &restart = {}, const Ranks &ranks = {});
 
 } // namespace sluice::solid

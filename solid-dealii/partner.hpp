@@ -61,6 +61,29 @@ public:
     if (bridge_)
       bridge_->advance(dt);
   }
+  /// Asks for an end at the next accepted window.
+  void request_stop() {
+    if (bridge_)
+      bridge_->request_stop();
+  }
+  bool is_stopped() const {
+    return told([](auto &bridge) { return bridge.is_stopped(); }) != 0;
+  }
+  bool requires_writing_restart() const {
+    return told([](auto &bridge) { return bridge.requires_writing_restart(); }) != 0;
+  }
+  long time_window() const {
+    return static_cast<long>(told([](auto &bridge) { return bridge.time_window(); }));
+  }
+  /// What the participant needs to go on; empty but on the root.
+  std::vector<std::byte> saved_state() const {
+    return bridge_ ? bridge_->saved_state() : std::vector<std::byte>();
+  }
+  void restore(std::span<const std::byte> saved) {
+    if (bridge_)
+      bridge_->restore(saved);
+  }
+  bool speaks() const { return bridge_ != nullptr; }
   void finalize() {
     if (bridge_)
       bridge_->finalize();

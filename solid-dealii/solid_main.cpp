@@ -39,7 +39,7 @@ void run(const Options &options, const sluice::solid::Ranks &ranks) {
     return solid::run_alone(options.task, config, options.water, options.out, options.restart,
                             ranks);
   std::filesystem::create_directories(options.out);
-  solid::run(config, options.out, ranks);
+  solid::run(config, options.out, options.restart, ranks);
 }
 
 } // namespace

@@ -72,6 +72,9 @@ void write_to(const std::filesystem::path &path, const SavedState &saved) {
   });
   if (group >= 0)
     H5Gclose(group);
+  if (const hsize_t size = saved.bridge.size(); is_written && size > 0)
+    is_written =
+        H5LTmake_dataset(file, "bridge", 1, &size, H5T_NATIVE_UCHAR, saved.bridge.data()) >= 0;
   is_written = is_written && H5Fflush(file, H5F_SCOPE_LOCAL) >= 0;
   check(is_written, "{}: cannot be written; is the folder writable and the disk not full?",
         path.string());
@@ -99,7 +102,7 @@ SavedState read_state(const std::filesystem::path &path, const SolidState &like)
   const std::string name = path.string();
   const File file(H5Fopen(name.c_str(), H5F_ACC_RDONLY, H5P_DEFAULT));
   check(file >= 0, "{}: not a readable HDF5 file", name);
-  SavedState saved{like, 0};
+  SavedState saved{like, 0, {}};
   int version = 0;
   long long step = 0;
   check(H5LTget_attribute_int(file, "/", "version", &version) >= 0 &&
@@ -124,6 +127,14 @@ SavedState read_state(const std::filesystem::path &path, const SolidState &like)
     check(size == 0 || H5LTread_dataset_double(file, place.c_str(), v.data()) >= 0,
           "{}: '{}' is damaged", name, place);
   });
+  if (H5LTfind_dataset(file, "bridge") > 0) {
+    hsize_t size = 0;
+    check(H5LTget_dataset_info(file, "bridge", &size, nullptr, nullptr) >= 0,
+          "{}: 'bridge' is damaged", name);
+    saved.bridge.resize(size);
+    check(H5LTread_dataset(file, "bridge", H5T_NATIVE_UCHAR, saved.bridge.data()) >= 0,
+          "{}: 'bridge' is damaged", name);
+  }
   return saved;
 }
 

@@ -10,14 +10,17 @@
 #include "solid-dealii/ranks.hpp"
 #include "solid-dealii/solid_state.hpp"
 
+#include <cstddef>
 #include <filesystem>
+#include <vector>
 
 namespace sluice::solid {
 
 /// A state and the moment it belongs to.
 struct SavedState {
   SolidState state;
-  double time = 0; ///< [s]
+  double time = 0;               ///< [s]
+  std::vector<std::byte> bridge{}; ///< of the participant, in the restart file of a coupled run
 };
 
 /// The file of this rank: `whole` for one, for several a name with rank and ranks, as the parts of

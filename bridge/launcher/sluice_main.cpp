@@ -1,10 +1,11 @@
 // SPDX-License-Identifier: MIT
 // sluice: starts every participant of a case as a process of its own.
 //
-//   sluice run CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--threads N]
+//   sluice run CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--threads N] [--restart DIR]
 //   sluice check CASE.toml [--set TABLE.KEY=VALUE]...
 //
 // Exit status: 0 complete, 1 failed, 2 wrong usage, 128 + signal when it was told to stop.
+#include "bridge/base/restart_files.hpp"
 #include "bridge/launcher/participants.hpp"
 #include "bridge/launcher/run_folder.hpp"
 #include "bridge/launcher/summary.hpp"
@@ -33,7 +34,8 @@ struct Options {
   std::vector<std::string> overrides;
   std::string out;
   std::string programs;
-  int threads = 0; ///< 0: every core that this process may use
+  std::string restart; ///< folder of the run to go on from
+  int threads = 0;     ///< 0: every core that this process may use
   double grace_s = Deadlines{}.grace_s;
 };
 
@@ -170,6 +172,23 @@ int report_refusal(const RunOutcome &outcome, const Case &scene) {
   return exit_failed;
 }
 
+/// What each participant goes on from; nothing for a run from the start.
+std::map<std::string, fs::path> restart_files_of(const std::vector<Participant> &participants,
+                                                 const Options &options, const fs::path &folder) {
+  if (options.restart.empty())
+    return {};
+  check(participants.size() > 1, "sluice: --restart is for coupled runs; the fluid alone goes on "
+                                 "from fluid.start_state");
+  check(!fs::exists(folder) || !fs::exists(options.restart) ||
+            !fs::equivalent(folder, options.restart),
+        "{}: a run cannot go on in the folder of the run it starts from; choose another --out",
+        folder.string());
+  std::vector<std::string> names;
+  for (const Participant &participant : participants)
+    names.push_back(participant.name);
+  return last_restart_files(fs::absolute(options.restart), names);
+}
+
 int run(const Options &options) {
   const Config config = Config::load(options.case_file, options.overrides);
   const Case scene = read_case(config);
@@ -179,6 +198,7 @@ int run(const Options &options) {
   const int threads = prepare_environment(options.threads);
   if (const RunOutcome answers = ask_participants(participants, options); !answers.ok())
     return report_refusal(answers, scene);
+  const auto restart_files = restart_files_of(participants, options, folder);
   const FolderLock lock = prepare_run_folder(folder, scene.name, options.case_file);
 
   RunDescription description{scene.name, fs::absolute(options.case_file).string(),
@@ -187,6 +207,8 @@ int run(const Options &options) {
   for (const Participant &participant : participants) {
     auto arguments = arguments_of(options);
     arguments.insert(arguments.end(), {"--out", folder.string()});
+    if (const auto file = restart_files.find(participant.name); file != restart_files.end())
+      arguments.insert(arguments.end(), {"--restart", file->second.string()});
     commands.push_back({participant.name, participant.program, std::move(arguments),
                         folder / (participant.name + ".log"),
                         commands.empty() ? Shown::yes : Shown::no});
@@ -253,6 +275,9 @@ int main(int argc, char **argv) {
   CLI::App *run_command = app.add_subcommand("run", "run a case");
   add_common_options(*run_command, options);
   run_command->add_option("--out", options.out, "folder for the output (default: out/<case>)");
+  run_command->add_option("--restart", options.restart,
+                          "folder of a run: go on from the last window of which it has restart "
+                          "files (bridge.restart_every_windows, or one that got SIGTERM)");
   run_command
       ->add_option("--grace", options.grace_s,
                    "seconds that the others get to end by themselves when one has failed")

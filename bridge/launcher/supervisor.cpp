@@ -194,6 +194,8 @@ private:
     const bool is_repeated = outcome_.signal != 0;
     outcome_.signal = signal;
     stop_all(is_repeated ? SIGKILL : signal);
+    if (signal == SIGTERM) // they may end their window and write what a restart needs
+      stop_at_s_ = watch_.seconds() + std::max(deadlines_.kill_s, deadlines_.grace_s);
   }
 
   void enforce_deadline() {

@@ -142,6 +142,68 @@ class FluidAloneTest(GateTest):
         self.assertIn("fluid.start_state is for the fluid alone", done.stderr)
 
 
+class RestartTest(GateTest):
+    """Windows that the fluid refuses are cut; a run that stops goes on as if it had not."""
+
+    # The fastest point may move 0.025 spacings per window: too little from the 20th window on.
+    CUT = ["fluid.courant=0.025", "bridge.max_halvings=4", "bridge.restart_every_windows=1",
+           "case.output_interval_s=0"]
+
+    def log(self, out):
+        return (out / "coupling.csv").read_text().splitlines()[1:]
+
+    def whole(self, end):
+        out = self.completed(f"case.end_time_s={end}", *self.CUT, name="whole")
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertGreater(summary["halved_windows"], 0)
+        self.assertEqual(summary["failed_windows"], 0)
+        for name in ("force_imbalance", "moment_imbalance", "work_imbalance"):
+            self.assertLess(max(self.column(out, "balance.csv", name)), BALANCE)
+        return out
+
+    def first_cut(self, out):
+        """Start of the first window that was tried again [s]."""
+        windows, iterations, ends = (self.column(out, "coupling.csv", name)
+                                     for name in ("window", "iteration", "time_s"))
+        for k in range(1, len(windows)):
+            if windows[k] == windows[k - 1] and iterations[k] == 1:
+                return ends[k - 1] - 5e-4
+        self.fail("no window was cut")
+
+    def test_cut_in_two_at_three_instants_it_leaves_the_same_bits(self):
+        whole = self.whole(0.016)
+        cut = self.first_cut(whole)
+        instants = {"before": 0.005, "right after a cut window": cut + 5e-4, "later": 0.0145}
+        for number, (name, end) in enumerate(instants.items()):
+            half = self.completed(f"case.end_time_s={end}", *self.CUT, name=f"half{number}")
+            rest = self.completed("case.end_time_s=0.016", *self.CUT, name=f"rest{number}",
+                                  arguments=["--restart", str(half)])
+            self.assertEqual(self.log(half) + self.log(rest), self.log(whole), name)
+
+    def test_told_to_stop_it_writes_its_state_and_goes_on_from_there(self):
+        whole = self.whole(0.016)
+        out = self.folder / "stopped"
+        program = subprocess.Popen(
+            [SLUICE, "run", str(CASE), "--out", str(out), *overrides(COARSE),
+             *overrides(["case.end_time_s=0.016", *self.CUT])],
+            stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+        while not (out / "coupling.csv").exists() or len(self.log(out)) < 30:
+            self.assertIsNone(program.poll())
+            time.sleep(0.005)
+        program.send_signal(signal.SIGTERM)
+        message = program.communicate(timeout=LONGEST_RUN_S)[1]
+        self.assertEqual(program.returncode, 128 + signal.SIGTERM)
+        self.assertIn("--restart", message)
+        rest = self.completed("case.end_time_s=0.016", *self.CUT, name="rest",
+                              arguments=["--restart", str(out)])
+        self.assertEqual(self.log(out) + self.log(rest), self.log(whole))
+
+    def test_a_folder_without_restart_files_is_refused(self):
+        done, _ = self.run_gate(arguments=["--restart", str(self.folder)])
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("restart_every_windows", done.stderr)
+
+
 class BadInputTest(GateTest):
     """Both programs end, soon, with a message that says what and where."""
 

@@ -3,9 +3,11 @@
 """The dummy solvers of every language, as separate programs: all follow the closed form."""
 import math
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 from pathlib import Path
 
@@ -60,6 +62,57 @@ class Dummies(unittest.TestCase):
                                 capture_output=True, text=True)
         self.assertEqual(answer.returncode, 1)
         self.assertIn("no-such.toml", answer.stderr)
+
+
+class PartnersEnd(unittest.TestCase):
+    """The exit status of whole programs; what each says is in failure_test and protocol_fault_test."""
+
+    def survivor_of(self, deadly_signal, victim):
+        with tempfile.TemporaryDirectory() as folder:
+            case = Path(folder) / "case.toml"
+            case.write_text(CASE.replace(str(WINDOWS * STEP), "1e6") + "silence_deadline_s = 1\n")
+            programs = {name: subprocess.Popen([BUILD / program, case, folder], text=True,
+                                               stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+                        for name, program in (("fluid", "dummy_fluid"), ("solid", "dummy_solid_c"))}
+            try:
+                log = Path(folder) / "coupling.csv"
+                while not log.exists() or log.stat().st_size < 200:
+                    for name, program in programs.items():
+                        self.assertIsNone(program.poll(), f"the {name} ended by itself")
+                    time.sleep(0.01)
+                programs[victim].send_signal(deadly_signal)
+                survivor = programs["solid" if victim == "fluid" else "fluid"]
+                message = survivor.communicate(timeout=10)[1]
+                return survivor.returncode, message
+            finally:
+                for program in programs.values():
+                    program.kill()
+                    program.communicate()
+
+    def test_a_killed_partner(self):
+        for victim in ("fluid", "solid"):
+            status, message = self.survivor_of(signal.SIGKILL, victim)
+            self.assertEqual(status, 1)
+            self.assertIn(f"the {victim} ended without a word", message)
+
+    def test_a_stopped_partner(self):
+        for victim in ("fluid", "solid"):
+            status, message = self.survivor_of(signal.SIGSTOP, victim)
+            self.assertEqual(status, 1)
+            self.assertIn(f"the {victim} was silent for 1 s", message)
+
+    def test_a_partner_with_another_case(self):
+        with tempfile.TemporaryDirectory() as folder:
+            cases = [Path(folder) / name for name in ("a.toml", "b.toml")]
+            cases[0].write_text(CASE)
+            cases[1].write_text(CASE.replace("_tolerance = 1e-8", "_tolerance = 0.125", 1))
+            programs = [subprocess.Popen([BUILD / program, case, folder], text=True,
+                                         stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+                        for program, case in zip(("dummy_fluid", "dummy_solid_c"), cases)]
+            for program in programs:
+                message = program.communicate(timeout=20)[1]
+                self.assertEqual(program.returncode, 1)
+                self.assertIn("displacement_tolerance = 0.125", message)
 
 
 if __name__ == "__main__":

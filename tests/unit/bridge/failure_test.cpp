@@ -4,40 +4,13 @@
 #include "bridge/base/csv.hpp"
 #include "bridge/message.hpp"
 #include "bridge/transport_socket.hpp"
+#include "child.hpp"
 #include "piston.hpp"
 
 #include "bridge/base/timer.hpp"
 
-#include <csignal>
-#include <sys/wait.h>
-#include <unistd.h>
-
 namespace sluice::bridge {
 namespace {
-
-/// Another process that runs `program` and is gone when this object is.
-class Child {
-public:
-  explicit Child(const std::function<void()> &program) : pid_(::fork()) {
-    if (pid_ != 0)
-      return;
-    try {
-      program();
-    } catch (...) {
-      ::_exit(1);
-    }
-    ::_exit(0);
-  }
-  ~Child() {
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
-  Child(const Child &) = delete;
-  Child &operator=(const Child &) = delete;
-
-private:
-  pid_t pid_;
-};
 
 // Called by the other program at the end of its first iteration in window 5.
 Event in_window_five(std::function<void(std::vector<double> &)> action) {
@@ -71,11 +44,6 @@ Survivor survive(const std::string &self, const Piston &piston, const Event &eve
       run_solid(bridge, piston);
   });
   return {error, watch.seconds()};
-}
-
-void expect_message(const std::string &message, std::initializer_list<std::string_view> parts) {
-  for (const auto part : parts)
-    EXPECT_TRUE(contains(message, part)) << "'" << part << "' is not in: " << message;
 }
 
 class EitherSide : public testing::TestWithParam<std::string> {
@@ -263,7 +231,7 @@ Survivor meet_stranger(const Bytes &bytes) {
     try {
       for (std::size_t k = 0; transport && !stop.stop_requested(); ++k) {
         transport->write_some(std::span(bytes).subspan(k % bytes.size(), 1), deadline_in(1));
-        if (k % header_size == header_size - 1 || bytes.size() == 1)
+        if (k % bytes.size() == bytes.size() - 1)
           std::this_thread::sleep_for(std::chrono::milliseconds(100));
       }
     } catch (const ConnectionLost &) { // turned away
@@ -286,6 +254,23 @@ TEST(Failure, a_stranger_that_trickles_bytes_does_not_renew_the_deadline) {
 TEST(Failure, a_heartbeat_is_no_greeting) {
   const auto [error, seconds] = meet_stranger(encode_frame(FrameType::heartbeat, 0, {}));
   expect_message(error, {"the fluid waited 0.5 s", "a heartbeat frame came instead of hello"});
+  EXPECT_LT(seconds, 3);
+}
+
+TEST(Failure, the_token_is_checked_before_the_rest_of_the_greeting_is_read) {
+  PayloadWriter greeting;
+  greeting.text("guessed").number(1000); // no text of 1000 characters follows
+  const auto [error, seconds] = meet_stranger(encode_frame(FrameType::hello, 0, greeting.bytes()));
+  expect_message(error, {"the fluid waited 0.5 s", "showed a wrong token"});
+  EXPECT_LT(seconds, 3);
+}
+
+TEST(Failure, a_stranger_has_no_last_words) {
+  PayloadWriter words;
+  words.text("believe me");
+  const auto [error, seconds] = meet_stranger(encode_frame(FrameType::abort, 0, words.bytes()));
+  expect_message(error, {"the fluid waited 0.5 s", "abort frame came instead of hello"});
+  EXPECT_FALSE(contains(error, "believe me"));
   EXPECT_LT(seconds, 3);
 }
 

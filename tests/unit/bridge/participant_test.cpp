@@ -207,8 +207,9 @@ TEST(Participant, an_advance_is_one_frame_each_way_and_copies_no_field_into_new_
   const Cost cost = cost_of_window(n_nodes);
   fmt::print("{} bytes of fields: {} sent, {} received, {} allocated\n", field, cost.bytes_sent,
              cost.bytes_received, cost.bytes_allocated);
-  EXPECT_EQ(cost.bytes_sent, field + header_size + 5 * 8);     // position, text, count, totals
-  EXPECT_EQ(cost.bytes_received, field + header_size + 5 * 8); // position, verdict, two counts
+  EXPECT_EQ(cost.bytes_sent, field + header_size + 6 * 8); // position, text, stop, count, totals
+  EXPECT_EQ(cost.bytes_received,
+            field + header_size + 6 * 8); // position, verdict, stop, two counts
   EXPECT_LT(cost.bytes_allocated, 10000); // records, texts; none as long as a field
 }
 

@@ -33,6 +33,12 @@ template <class Action> std::string error_of(Action &&action) {
   return "";
 }
 
+inline void expect_message(const std::string &message,
+                           std::initializer_list<std::string_view> parts) {
+  for (const auto part : parts)
+    EXPECT_TRUE(contains(message, part)) << "'" << part << "' is not in: " << message;
+}
+
 inline std::vector<double> random_values(std::size_t n, unsigned seed, double size = 1) {
   std::mt19937 engine(seed);
   std::uniform_real_distribution<double> uniform(-size, size);
