@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "bridge/acceleration_imvj.hpp"
 
-#include <algorithm>
-
 namespace sluice::bridge {
 
 Eigen::VectorXd MultiVector::before(const Eigen::VectorXd &residual) const {
@@ -24,14 +22,8 @@ LeastSquares MultiVector::of_this_window(Eigen::Index most) const {
 
 void MultiVector::remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
                            double resolution) {
-  const Eigen::VectorXd residual = solved - iterate;
-  if (last_residual_.size() > 0) {
-    const Eigen::VectorXd change = residual - last_residual_;
-    if (change.norm() > std::max(resolution, 1e-14 * solved.norm()))
-      columns_.push_back({change, solved - last_solved_});
-  }
-  last_residual_ = residual;
-  last_solved_ = solved;
+  if (auto column = last_.column_to(iterate, solved, resolution))
+    columns_.push_back(*std::move(column));
 }
 
 AcceleratedIterate MultiVector::next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
@@ -58,8 +50,7 @@ void MultiVector::finish_window(const Eigen::VectorXd &iterate, const Eigen::Vec
 
 void MultiVector::forget_window() {
   columns_.clear();
-  last_residual_.resize(0);
-  last_solved_.resize(0);
+  last_.forget();
 }
 
 } // namespace sluice::bridge

@@ -11,6 +11,7 @@
 #pragma once
 
 #include "bridge/acceleration_aitken.hpp"
+#include "bridge/acceleration_column.hpp"
 #include "bridge/least_squares.hpp"
 
 #include <deque>
@@ -19,7 +20,7 @@ namespace sluice::bridge {
 
 class MultiVector {
 public:
-  MultiVector(double initial_relaxation, int windows_reused, double filter = 1e-2)
+  MultiVector(double initial_relaxation, int windows_reused, double filter = 1e-4)
       : initial_relaxation_(initial_relaxation),
         windows_reused_(static_cast<std::size_t>(windows_reused)), filter_(filter) {}
   /// `resolution`: a smaller change of the residual makes no column.
@@ -30,14 +31,10 @@ public:
   /// The window starts anew: what it taught so far is dropped.
   void forget_window();
   template <class Archive> void archive(Archive &a) {
-    a(windows_, columns_, last_residual_, last_solved_);
+    a(windows_, columns_, last_);
   }
 
 private:
-  struct Column {
-    Eigen::VectorXd residual_change, solution_change;
-    template <class Archive> void archive(Archive &a) { a(residual_change, solution_change); }
-  };
   void remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved, double resolution);
   Eigen::VectorXd before(const Eigen::VectorXd &residual) const; // -J_before r
   LeastSquares of_this_window(Eigen::Index most) const;
@@ -45,9 +42,9 @@ private:
   double initial_relaxation_;
   std::size_t windows_reused_;
   double filter_;
-  std::deque<LeastSquares> windows_;            // newest first
-  std::vector<Column> columns_;                 // of this window, newest last
-  Eigen::VectorXd last_residual_, last_solved_; // empty at the start of a window
+  std::deque<LeastSquares> windows_; // newest first
+  std::vector<Column> columns_;      // of this window, newest last
+  LastIteration last_;
 };
 
 } // namespace sluice::bridge

@@ -16,25 +16,20 @@ LeastSquares QuasiNewton::orthogonalised(Eigen::Index most) const {
 
 void QuasiNewton::distrust(const Eigen::VectorXd &residual) {
   const double size = residual.norm();
-  if (last_residual_.size() == 0)
+  if (last_.is_none())
     first_residual_ = size;
   else if (size > first_residual_)
     history_.resize(1);
 }
 
-// A change of the size of rounding or noise has no direction; as the newest column it would come
-// first and bend all others.
 void QuasiNewton::remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
                            double resolution) {
-  const Eigen::VectorXd residual = solved - iterate;
-  distrust(residual);
-  if (last_residual_.size() > 0) {
-    const Eigen::VectorXd change = residual - last_residual_;
-    if (change.norm() > std::max(resolution, 1e-14 * solved.norm()))
-      history_.front().push_back({change, solved - last_solved_});
+  distrust(solved - iterate);
+  if (auto column = last_.column_to(iterate, solved, resolution)) {
+    history_.front().push_back(*std::move(column));
+    if (windows_reused_ == 0)
+      history_.resize(1);
   }
-  last_residual_ = residual;
-  last_solved_ = solved;
 }
 
 AcceleratedIterate QuasiNewton::next(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
@@ -50,17 +45,16 @@ AcceleratedIterate QuasiNewton::next(const Eigen::VectorXd &iterate, const Eigen
 void QuasiNewton::finish_window(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved,
                                 double resolution) {
   remember(iterate, solved, resolution);
-  last_residual_.resize(0);
-  last_solved_.resize(0);
-  history_.emplace_front();
-  while (history_.size() > windows_reused_ + 1)
+  last_.forget();
+  if (!history_.front().empty())
+    history_.emplace_front();
+  while (history_.size() > std::max<std::size_t>(windows_reused_, 1) + 1)
     history_.pop_back();
 }
 
 void QuasiNewton::forget_window() {
   history_.front().clear();
-  last_residual_.resize(0);
-  last_solved_.resize(0);
+  last_.forget();
 }
 
 } // namespace sluice::bridge

@@ -8,7 +8,8 @@
 // Source: Degroote, Bathe and Vierendeels, Comput. Struct. 87 (2009) 793-801.
 // The columns are orthogonalised from the newest to the oldest; one whose new part is below
 // `filter` of its length only repeats what newer ones say and is left out of this step
-// (least_squares.hpp). Without a column: the relaxed step.
+// (least_squares.hpp). Without a column: the relaxed step. With windows_reused = 0 the columns of
+// the last window serve until this one has its first.
 //
 // Ours: a residual larger than the window's first one says that the columns of earlier windows
 // mislead (they are old, or full of the solvers' noise); they are forgotten at once. On a chain of
@@ -17,6 +18,7 @@
 #pragma once
 
 #include "bridge/acceleration_aitken.hpp"
+#include "bridge/acceleration_column.hpp"
 #include "bridge/least_squares.hpp"
 
 #include <deque>
@@ -26,7 +28,7 @@ namespace sluice::bridge {
 
 class QuasiNewton {
 public:
-  QuasiNewton(double initial_relaxation, int windows_reused, double filter = 1e-2)
+  QuasiNewton(double initial_relaxation, int windows_reused, double filter = 1e-4)
       : initial_relaxation_(initial_relaxation),
         windows_reused_(static_cast<std::size_t>(windows_reused)), filter_(filter) {}
   /// `resolution` [m]: a smaller change of the residual makes no column.
@@ -37,14 +39,10 @@ public:
   /// The window starts anew: what it taught so far is dropped.
   void forget_window();
   template <class Archive> void archive(Archive &a) {
-    a(history_, first_residual_, last_residual_, last_solved_);
+    a(history_, first_residual_, last_);
   }
 
 private:
-  struct Column {
-    Eigen::VectorXd residual_change, solution_change;
-    template <class Archive> void archive(Archive &a) { a(residual_change, solution_change); }
-  };
   void distrust(const Eigen::VectorXd &residual);
   void remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved, double resolution);
   LeastSquares orthogonalised(Eigen::Index most) const;
@@ -54,7 +52,7 @@ private:
   double filter_;
   std::deque<std::vector<Column>> history_{1}; // front: this window; in a window the newest is last
   double first_residual_ = 0;                  // norm, of this window [m]
-  Eigen::VectorXd last_residual_, last_solved_; // empty at the start of a window
+  LastIteration last_;
 };
 
 } // namespace sluice::bridge

@@ -103,7 +103,7 @@ std::unique_ptr<Transport> retry_connecting(const BridgeSettings &settings,
   using std::chrono::milliseconds;
   const Deadline deadline = deadline_in(settings.connect_deadline);
   for (milliseconds pause(1); Clock::now() < deadline;
-       pause = std::min(2 * pause, milliseconds(16))) {
+       pause = std::min(2 * pause, milliseconds(4))) {
     if (auto transport = try_connect(address, deadline))
       return transport;
     std::this_thread::sleep_for(pause);

@@ -10,16 +10,26 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cassert>
+#include <cstddef>
 
 namespace sluice::bridge {
 
 namespace {
 
-using NodeValues = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-Eigen::Map<const NodeValues> by_node(std::span<const double> values, int dim) {
-  return {values.data(), static_cast<Eigen::Index>(values.size()) / dim, dim};
+// The first `dim` components of each node; the row's sums stay in registers.
+template <int dim>
+void multiply_components(double factor, const Mapping::Matrix &matrix, const double *in, int dim_in,
+                         double *out, int dim_out) {
+  const double *weight = matrix.valuePtr();
+  const int *node = matrix.innerIndexPtr(), *start = matrix.outerIndexPtr();
+  for (Eigen::Index row = 0; row < matrix.rows(); ++row) {
+    Vec<dim> sum = Vec<dim>::Zero();
+    for (int k = start[row]; k < start[row + 1]; ++k)
+      sum += weight[k] * Eigen::Map<const Vec<dim>>(in + std::ptrdiff_t{node[k]} * dim_in);
+    Eigen::Map<Vec<dim>>(out + row * dim_out) = factor * sum;
+  }
 }
 
 // `factor` times the matrix times each component that both sides have; the others are zero.
@@ -27,15 +37,13 @@ void multiply(double factor, const Mapping::Matrix &matrix, std::span<const doub
               int dim_in, int dim_out, std::span<double> result) {
   assert(static_cast<Eigen::Index>(values.size()) == matrix.cols() * dim_in);
   assert(static_cast<Eigen::Index>(result.size()) == matrix.rows() * dim_out);
-  Eigen::Map<NodeValues> out(result.data(), matrix.rows(), dim_out);
-  if (dim_in == dim_out) {
-    out.noalias() = matrix * by_node(values, dim_in);
-  } else {
-    out.setZero();
-    out.leftCols(2) = matrix * by_node(values, dim_in).leftCols(2);
-  }
-  if (factor != 1)
-    out *= factor;
+  assert(matrix.isCompressed());
+  if (dim_in != dim_out)
+    std::fill(result.begin(), result.end(), 0.0);
+  if (std::min(dim_in, dim_out) == 3)
+    multiply_components<3>(factor, matrix, values.data(), dim_in, result.data(), dim_out);
+  else
+    multiply_components<2>(factor, matrix, values.data(), dim_in, result.data(), dim_out);
 }
 
 bool is_unit_matrix(const Mapping::Matrix &matrix) {
@@ -55,6 +63,7 @@ Mapping::Mapping(const InterfaceMesh &fluid, const InterfaceMesh &solid, Matrix 
       transpose_(matrix_.transpose()), fluid_areas_(node_areas(fluid)),
       solid_areas_(node_areas(solid)), report_(report),
       is_identity_(fluid.dim == solid.dim && depth == 1 && is_unit_matrix(matrix_)) {
+  matrix_.makeCompressed();
   const Eigen::VectorXd row_sums = matrix_ * Eigen::VectorXd::Ones(matrix_.cols());
   report_.fluid_nodes = fluid.n_nodes();
   report_.solid_nodes = solid.n_nodes();

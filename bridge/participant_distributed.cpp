@@ -218,6 +218,7 @@ void DistributedParticipant::advance(double dt) {
 void DistributedParticipant::finalize() {
   agree();
   act([](Participant &bridge) { bridge.finalize(); });
+  is_over_ = true;
 }
 
 void DistributedParticipant::abort(std::string_view message) noexcept {

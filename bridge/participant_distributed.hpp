@@ -62,7 +62,7 @@ private:
   int rank_ = 0, n_ranks_ = 1;
   std::unique_ptr<Participant> bridge_; // rank 0
   State state_;
-  bool is_over_ = false; // all ranks know of a failure
+  bool is_over_ = false; // all ranks know of the end
   int dim_ = 2;
   std::size_t n_own_ = 0;            // values of this rank
   std::vector<int> numbers_;         // rank 0: of all nodes, rank by rank

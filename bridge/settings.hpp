@@ -59,7 +59,7 @@ struct BridgeSettings {
   int max_halvings = 0;                 ///< of a window that fails; 0: the run ends
   int windows_to_grow = 4;              ///< accepted before a halved length doubles
   int windows_reused = 8;               ///< by the quasi-Newton methods
-  double filter = 1e-2;                 ///< of quasi-Newton columns that repeat newer ones
+  double filter = 1e-4;                 ///< of quasi-Newton columns that repeat newer ones
   int restart_every = 0;                ///< windows between restart files; 0: none
   double initial_relaxation = 0.05;     ///< of the first iteration without history
 
@@ -114,7 +114,7 @@ struct BridgeSettings {
     read("windows_reused", windows_reused, "earlier windows whose history quasi-Newton keeps")
         .at_least(0);
     read("filter", filter,
-         "part of a quasi-Newton column that must be new; smaller where the solvers have no noise")
+         "part of a quasi-Newton column that must be new, that is not said by newer ones")
         .positive()
         .at_most(1);
     read("initial_relaxation", initial_relaxation, "step of an iteration without history")

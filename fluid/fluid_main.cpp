@@ -20,7 +20,7 @@ void run(const Options &options) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
   config.allow_tables({"case", "parameters", "bridge", "fluid", "fluid.rheology", "fluid.wall",
-                       "fluid.gauge", "fluid.probe", "solid", "solid.*"});
+                       "fluid.gauge", "fluid.probe", "solid", "solid.boundary", "solid.probe"});
   if (options.threads > 0)
     fluid::set_number_of_threads(options.threads);
   if (options.check_only) {

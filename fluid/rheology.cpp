@@ -1,11 +1,15 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/rheology.hpp"
 
+#include <algorithm>
+
 namespace sluice::fluid {
 
 namespace {
 
 ViscosityLaw make_law(const RheologyParams &p, double newtonian_viscosity) {
+  if (p.law == "power-law" && p.exponent == 1) // no shear rate is needed
+    return Newtonian{std::clamp(p.consistency, p.lowest, p.highest)};
   if (p.law == "power-law")
     return PowerLaw{p.consistency, p.exponent};
   if (p.law == "carreau-yasuda")
@@ -21,11 +25,11 @@ ViscosityLaw make_law(const RheologyParams &p, double newtonian_viscosity) {
 
 } // namespace
 
-Rheology::Rheology(const RheologyParams &params, double newtonian_viscosity)
-    : law_(make_law(params, newtonian_viscosity)), params_(params) {
+Rheology::Rheology(const RheologyParams &params, double newtonian_viscosity) : params_(params) {
   check(params.lowest <= params.highest,
         "[fluid.rheology]: lowest_viscosity_pa_s = {} exceeds highest_viscosity_pa_s = {}",
         params.lowest, params.highest);
+  law_ = make_law(params, newtonian_viscosity);
 }
 
 } // namespace sluice::fluid

@@ -126,37 +126,56 @@ MapConfig read_map(const Element &e, bridge::MapKind kind) {
           one_of("constraint", "conservative", "consistent"), e.text("from"), e.text("to")};
 }
 
+// "x;y" or "x;y;z".
+std::vector<double> coordinates_of(const Element &e) {
+  std::string written = e.text("coordinate");
+  std::replace(written.begin(), written.end(), ';', ' ');
+  std::istringstream in(written);
+  std::vector<double> values;
+  for (double value = 0; in >> value;)
+    values.push_back(value);
+  check(in.eof() && !values.empty(), "{}: <{}> has coordinate = '{}', expected x;y or x;y;z",
+        e.place(), e.name(), e.text("coordinate"));
+  return values;
+}
+
 ParticipantConfig read_participant(const Element &e) {
   e.allow({"name"});
   ParticipantConfig p;
   const auto map = [&](bridge::MapKind kind) {
     return [&p, kind](const Element &c) { p.maps.push_back(read_map(c, kind)); };
   };
-  read_children(e, {{"provide-mesh",
-                     [&](const Element &c) {
-                       c.allow({"name"});
-                       p.provided.push_back(c.text("name"));
-                     }},
-                    {"receive-mesh",
-                     [&](const Element &c) {
-                       c.allow({"name", "from"});
-                       p.received[c.text("name")] = c.text("from");
-                     }},
-                    {"write-data",
-                     [&](const Element &c) {
-                       c.allow({"name", "mesh"});
-                       p.written.push_back(field_of(c));
-                     }},
-                    {"read-data",
-                     [&](const Element &c) {
-                       c.allow({"name", "mesh"});
-                       p.read.push_back(field_of(c));
-                     }},
-                    {"mapping:nearest-neighbor", map(bridge::MapKind::nearest)},
-                    {"mapping:nearest-projection", map(bridge::MapKind::projection)},
-                    {"mapping:rbf", map(bridge::MapKind::rbf)},
-                    {"mapping:rbf-pum-direct", map(bridge::MapKind::rbf)},
-                    {"mapping:rbf-global-direct", map(bridge::MapKind::rbf)}});
+  read_children(e,
+                {{"provide-mesh",
+                  [&](const Element &c) {
+                    c.allow({"name"});
+                    p.provided.push_back(c.text("name"));
+                  }},
+                 {"receive-mesh",
+                  [&](const Element &c) {
+                    c.allow({"name", "from"});
+                    p.received[c.text("name")] = c.text("from");
+                  }},
+                 {"write-data",
+                  [&](const Element &c) {
+                    c.allow({"name", "mesh"});
+                    p.written.push_back(field_of(c));
+                  }},
+                 {"read-data",
+                  [&](const Element &c) {
+                    c.allow({"name", "mesh"});
+                    p.read.push_back(field_of(c));
+                  }},
+                 {"watch-point",
+                  [&](const Element &c) {
+                    c.allow({"name", "mesh", "coordinate"});
+                    p.watch_points.push_back({c.text("name"), c.text("mesh"), coordinates_of(c)});
+                  }},
+                 {"mapping:nearest-neighbor", map(bridge::MapKind::nearest)},
+                 {"mapping:nearest-projection", map(bridge::MapKind::projection)},
+                 {"mapping:rbf", map(bridge::MapKind::rbf)},
+                 {"mapping:rbf-pum-direct", map(bridge::MapKind::rbf)},
+                 {"mapping:rbf-global-direct", map(bridge::MapKind::rbf)}});
   return p;
 }
 
@@ -329,6 +348,12 @@ void check_names(const Configuration &config, const std::string &file) {
   for (const std::string &name : {config.first, config.second, config.acceptor, config.connector})
     check(config.participants.contains(name), "{}: there is no <participant> '{}'", file, name);
   for (const auto &[name, p] : config.participants) {
+    for (const WatchPoint &point : p.watch_points)
+      check(std::find(p.provided.begin(), p.provided.end(), point.mesh) != p.provided.end() &&
+                static_cast<int>(point.coordinate.size()) ==
+                    config.meshes.at(point.mesh).dimensions,
+            "{}: the watch-point '{}' needs a mesh that {} provides, and as many coordinates", file,
+            point.name, name);
     for (const auto &mesh : p.provided)
       check(config.meshes.contains(mesh), "{}: there is no <mesh> '{}' for participant '{}'", file,
             mesh, name);

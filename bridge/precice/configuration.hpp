@@ -30,11 +30,18 @@ struct MapConfig {
   std::string from, to;
 };
 
+/// A place of an own mesh whose nearest vertex is recorded after every window.
+struct WatchPoint {
+  std::string name, mesh;
+  std::vector<double> coordinate; ///< [m]
+};
+
 struct ParticipantConfig {
   std::vector<std::string> provided;           ///< meshes
   std::map<std::string, std::string> received; ///< mesh: the participant it comes from
   std::vector<FieldName> written, read;
   std::vector<MapConfig> maps;
+  std::vector<WatchPoint> watch_points;
 };
 
 struct Exchange {

@@ -2,6 +2,7 @@
 #include "bridge/precice/coupling.hpp"
 
 #include "bridge/base/check.hpp"
+#include "bridge/node_tree.hpp"
 #include "bridge/side.hpp"
 #include "bridge/transport_socket.hpp"
 
@@ -417,8 +418,10 @@ void Coupling::advance(double dt) {
     is_complete_ = converged;
     is_rejected_ = !converged;
     iteration_ = converged ? 1 : iteration_ + 1;
-    if (converged)
+    if (converged) {
       clock_.next_window();
+      record_watch_points();
+    }
     if (!is_first_ && !config_.is_parallel && is_ongoing())
       receive_fields(FrameType::forces, "the data of the next iteration");
   });
@@ -546,6 +549,34 @@ void Coupling::take_over(bool has_converged) {
     way.end = mapped(way, way.iterate);
     if (has_converged)
       way.start = way.end;
+  }
+}
+
+// precice-NAME-watchpoint-POINT.log in the current folder: the time, then the fields of the mesh at
+// the vertex that is nearest to the point.
+void Coupling::record_watch_points() {
+  if (watches_.empty())
+    for (const WatchPoint &point : self_.watch_points) {
+      bridge::InterfaceMesh place{mesh(point.mesh).dim, mesh(point.mesh).dim, point.coordinate, {}};
+      std::string header = "time_s";
+      for (const Way &way : ways_)
+        for (int c = 0; way.own.mesh == point.mesh && c < way.components; ++c)
+          header += fmt::format(",{}_{}", way.own.data, c);
+      const bridge::NodeTree nodes(mesh(point.mesh));
+      watches_.push_back(
+          {static_cast<std::size_t>(nodes.nearest(place.point(0), 1).front().node), point.mesh,
+           CsvWriter(fmt::format("precice-{}-watchpoint-{}.log", name_, point.name), header)});
+    }
+  for (Watch &watch : watches_) {
+    std::vector<double> row{clock_.time()};
+    for (const Way &way : ways_)
+      for (int c = 0; way.own.mesh == watch.mesh && c < way.components; ++c) {
+        const std::size_t k =
+            watch.node * static_cast<std::size_t>(way.components) + static_cast<std::size_t>(c);
+        row.push_back(way.goes_out ? written_.at({watch.mesh, way.own.data})[k]
+                                   : way.start[static_cast<Eigen::Index>(k)]);
+      }
+    watch.csv.row(row);
   }
 }
 

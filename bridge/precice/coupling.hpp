@@ -12,6 +12,7 @@
 #pragma once
 
 #include "bridge/acceleration.hpp"
+#include "bridge/base/csv.hpp"
 #include "bridge/link.hpp"
 #include "bridge/precice/configuration.hpp"
 #include "bridge/window_clock.hpp"
@@ -89,6 +90,7 @@ private:
   void accelerate(bool has_converged);
   bool find_scales();
   void take_over(bool has_converged);
+  void record_watch_points();
   void give_up(std::string_view message) noexcept;
 
   template <class Action> void told(Action &&action) {
@@ -110,6 +112,13 @@ private:
   std::vector<Way> ways_;
   std::optional<bridge::Acceleration> acceleration_;
   std::unique_ptr<bridge::Link> link_;
+  /// The nearest vertex of a watch-point and its file.
+  struct Watch {
+    std::size_t node;
+    std::string mesh;
+    CsvWriter csv;
+  };
+  std::vector<Watch> watches_;
   int iteration_ = 1;
   bool is_complete_ = false, is_rejected_ = false, is_silent_ = false;
 };

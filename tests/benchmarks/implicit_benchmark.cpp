@@ -37,16 +37,13 @@ int main() {
       {"Aitken 0.5", tube_settings("aitken", 0.5, 0)},
       {"Aitken 0.1", tube_settings("aitken", 0.1, 0)},
       {"IQN-ILS, no reuse", tube_settings("iqn-ils", 0.1, 0)},
-      {"IQN-ILS, no reuse, filter 1e-3", tube_settings("iqn-ils", 0.1, 0, 1e-3)},
       {"IQN-ILS, 8 windows", tube_settings("iqn-ils", 0.1, 8)},
-      {"IQN-ILS, 8 windows, filter 1e-3", tube_settings("iqn-ils", 0.1, 8, 1e-3)},
+      {"IQN-ILS, 8 windows, filter 1e-2", tube_settings("iqn-ils", 0.1, 8, 1e-2)},
       {"IQN-ILS, 8 windows, filter 1e-6", tube_settings("iqn-ils", 0.1, 8, 1e-6)},
       {"IQN-IMVJ, 8 windows", tube_settings("iqn-imvj", 0.1, 8)},
       {"IQN-IMVJ, 40 windows, filter 1e-6", tube_settings("iqn-imvj", 0.1, 40, 1e-6)},
-      {"parallel, IQN-ILS, 8 windows, filter 1e-6",
-       parallel(tube_settings("iqn-ils", 0.1, 8, 1e-6))},
-      {"parallel, IQN-IMVJ, 8 windows, filter 1e-6",
-       parallel(tube_settings("iqn-imvj", 0.1, 8, 1e-6))}};
+      {"parallel, IQN-ILS, 8 windows", parallel(tube_settings("iqn-ils", 0.1, 8))},
+      {"parallel, IQN-IMVJ, 8 windows", parallel(tube_settings("iqn-imvj", 0.1, 8))}};
   fmt::print("| scheme |");
   for (const auto &[ratio, reference] : Tube::references())
     fmt::print(" R = {} |", ratio);

@@ -12,7 +12,7 @@
 namespace sluice::bridge {
 
 inline BridgeSettings tube_settings(const std::string &acceleration, double relaxation,
-                                    int windows_reused, double filter = 1e-2) {
+                                    int windows_reused, double filter = BridgeSettings().filter) {
   BridgeSettings settings;
   settings.acceleration = acceleration;
   settings.initial_relaxation = relaxation;

@@ -9,7 +9,7 @@ import unittest
 from pathlib import Path
 
 PROGRAM = os.environ["SLUICE_MPI_PISTON"]
-WINDOWS, STEP = 20, 1e-3
+WINDOWS, STEP = 6, 1e-3
 CASE = f"""
 [case]
 name = "piston"

@@ -39,6 +39,7 @@ CONFIG = """<?xml version="1.0" encoding="UTF-8" ?>
     <provide-mesh name="Solid-Mesh" />
     <write-data name="Velocity" mesh="Solid-Mesh" />
     <read-data name="Force" mesh="Solid-Mesh" />
+    <watch-point mesh="Solid-Mesh" name="Top" coordinate="0.1;0.9" />
   </participant>
   <m2n:sockets acceptor="Fluid" connector="Solid" exchange-directory="." />
   <coupling-scheme:serial-implicit>
@@ -91,6 +92,9 @@ class PreciceTest(unittest.TestCase):
         (_, (_, error)), (status, (out, solid_error)) = self.both(text)
         self.assertEqual((status, error, solid_error), (0, "", ""))
         displacement, iterations, windows = out.split()
+        rows = (self.folder / "precice-Solid-watchpoint-Top.log").read_text().splitlines()
+        self.assertEqual(rows[0], "time_s,Force_0,Force_1,Velocity_0,Velocity_1")
+        self.assertEqual(len(rows), 1 + WINDOWS)
         self.assertEqual(int(windows), WINDOWS)
         print(f"{int(iterations) / WINDOWS:.2f} iterations per window")
         return float(displacement), int(iterations)

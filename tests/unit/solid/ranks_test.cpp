@@ -222,7 +222,7 @@ std::vector<std::vector<double>> read_csv(const fs::path &file) {
 void couple(const Ranks &these, const fs::path &folder) {
   const Config config = Config::parse(case_text, "case.toml");
   if (!these.is_root())
-    return run(nullptr, config, folder, these);
+    return run(nullptr, config, folder, {}, these);
   auto [ours, theirs] = bridge::local_transports();
   std::string fluid_error;
   std::thread fluid([&, transport = std::move(theirs)]() mutable {
@@ -242,7 +242,7 @@ void couple(const Ranks &these, const fs::path &folder) {
     }
   });
   bridge::Participant bridge("solid", config, folder, std::move(ours));
-  run(&bridge, config, folder, these);
+  run(&bridge, config, folder, {}, these);
   fluid.join();
   EXPECT_EQ(fluid_error, "");
 }
