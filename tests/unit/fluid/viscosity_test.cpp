@@ -16,8 +16,9 @@ using testing::FrozenCloud;
 constexpr double nu = 0.01;
 
 void build_rows(const FrozenCloud &frozen, ViscousProblem<2> &problem) {
-  RheologyParams any; // not newtonian: with the gradients
+  RheologyParams any; // whose rows have gradients: not newtonian
   any.law = "power-law";
+  any.exponent = 2;
   PressureProblem<2> pressure;
   assemble_pressure_operators(frozen.points, frozen.cloud, {}, pressure);
   build_viscous_rows(frozen.points, frozen.cloud, Rheology(any, 1), pressure, problem.rows);
