@@ -30,9 +30,7 @@ public:
                      double resolution = 0);
   /// The window starts anew: what it taught so far is dropped.
   void forget_window();
-  template <class Archive> void archive(Archive &a) {
-    a(windows_, columns_, last_);
-  }
+  template <class Archive> void archive(Archive &a) { a(windows_, columns_, last_); }
 
 private:
   void remember(const Eigen::VectorXd &iterate, const Eigen::VectorXd &solved, double resolution);

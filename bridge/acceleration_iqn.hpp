@@ -38,9 +38,7 @@ public:
                      double resolution = 0);
   /// The window starts anew: what it taught so far is dropped.
   void forget_window();
-  template <class Archive> void archive(Archive &a) {
-    a(history_, first_residual_, last_);
-  }
+  template <class Archive> void archive(Archive &a) { a(history_, first_residual_, last_); }
 
 private:
   void distrust(const Eigen::VectorXd &residual);

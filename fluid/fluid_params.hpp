@@ -121,9 +121,10 @@ template <int dim> struct FluidParams {
          "pressure")
         .at_least(1)
         .at_most(2);
-    read("courant", courant,
-         "spacings that the fastest point may move in a step, which then is adapted; with a partner "
-         "a longer window is halved (bridge.max_halvings). 0: always case.time_step_s")
+    read(
+        "courant", courant,
+        "spacings that the fastest point may move in a step, which then is adapted; with a partner "
+        "a longer window is halved (bridge.max_halvings). 0: always case.time_step_s")
         .at_least(0)
         .at_most(1);
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")

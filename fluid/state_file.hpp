@@ -17,8 +17,8 @@ namespace sluice::fluid {
 /// A state, the moment it belongs to and the spacing that it was computed with.
 template <int dim> struct SavedState {
   FluidState<dim> state;
-  double time = 0;               // [s]
-  double spacing = 0;            // [m]
+  double time = 0;                 // [s]
+  double spacing = 0;              // [m]
   std::vector<std::byte> bridge{}; // of the participant, in the restart file of a coupled run
 };
 

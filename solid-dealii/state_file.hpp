@@ -19,7 +19,7 @@ namespace sluice::solid {
 /// A state and the moment it belongs to.
 struct SavedState {
   SolidState state;
-  double time = 0;               ///< [s]
+  double time = 0;                 ///< [s]
   std::vector<std::byte> bridge{}; ///< of the participant, in the restart file of a coupled run
 };
 

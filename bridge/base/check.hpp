@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// Two classes of failure. `check` is for the user: it says what is wrong, with the numbers, and what
-// to do; it throws UserError, which only `main` catches. `assert` is for broken invariants of ours.
+// Two classes of failure. `check` is for the user: it says what is wrong, with the numbers, and
+// what to do; it throws UserError, which only `main` catches. `assert` is for broken invariants of
+// ours.
 #pragma once
 
 #include <fmt/format.h>

@@ -293,8 +293,7 @@ std::optional<int> whole_number(const toml::node &node) {
 
 namespace {
 
-template <class Vector>
-std::optional<std::vector<Vector>> vectors_of(const toml::node &node) {
+template <class Vector> std::optional<std::vector<Vector>> vectors_of(const toml::node &node) {
   const auto *array = node.as_array();
   if (!array)
     return std::nullopt;
@@ -401,11 +400,11 @@ std::string text_of(const toml::node *node) {
 
 Entry &Entry::check(bool holds, std::string_view what) {
   if (!holds && !reader_.state_->missing)
-    reader_.fail_at(key_, fmt::format("{} = {} {}", key_,
-                                      text_of(reader_.state_->table
-                                                  ? reader_.state_->table->get(key_)
-                                                  : nullptr),
-                                      what));
+    reader_.fail_at(
+        key_,
+        fmt::format("{} = {} {}", key_,
+                    text_of(reader_.state_->table ? reader_.state_->table->get(key_) : nullptr),
+                    what));
   return *this;
 }
 

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// Reading a case file. One TOML file describes all participants of a case; each reads its own tables.
+// Reading a case file. One TOML file describes all participants of a case; each reads its own
+// tables.
 //
 // A parameter struct names every key once, in `describe`, with its unit (the key's suffix) and its
 // meaning; that one function gives reading, defaults, ranges and the error for an unknown key:

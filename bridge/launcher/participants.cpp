@@ -119,10 +119,11 @@ std::vector<Participant> participants_of(const Config &config, const fs::path &f
         "{}: a wall is coupled, but there is no [solid] table; give it one, or hold the walls with "
         "fluid.coupled_walls = \"stay\"",
         config.file_name());
-  check(is_coupled || !config.has_table("solid") || walls_are_held(config),
-        "{}: there is a [solid] table, but no [[fluid.wall]] has coupled = true: nothing would move "
-        "with it",
-        config.file_name());
+  check(
+      is_coupled || !config.has_table("solid") || walls_are_held(config),
+      "{}: there is a [solid] table, but no [[fluid.wall]] has coupled = true: nothing would move "
+      "with it",
+      config.file_name());
   std::vector<Participant> found;
   for (const Role &role : roles)
     if (config.has_table(role.table) && (role.table == "fluid" || is_coupled))

@@ -37,7 +37,8 @@ bool contains(const std::string &text, std::string_view part) {
 }
 
 TEST(Config, reads_values_and_keeps_defaults) {
-  const auto config = Config::parse("[fluid]\nspacing_m = 0.002\nwall_m = [[0, 1], [2, 3.5]]\n", "c");
+  const auto config =
+      Config::parse("[fluid]\nspacing_m = 0.002\nwall_m = [[0, 1], [2, 3.5]]\n", "c");
   const auto water = config.read<Water>("fluid");
   EXPECT_EQ(water.spacing, 0.002);
   EXPECT_EQ(water.density, 1000);
@@ -47,7 +48,8 @@ TEST(Config, reads_values_and_keeps_defaults) {
 
 TEST(Config, an_override_replaces_one_value) {
   const std::vector<std::string> overrides{"fluid.spacing_m=1e-3", "fluid.scheme=explicit"};
-  const auto config = Config::parse("[fluid]\nspacing_m = 0.002\ndensity_kg_m3 = 900\n", "c", overrides);
+  const auto config =
+      Config::parse("[fluid]\nspacing_m = 0.002\ndensity_kg_m3 = 900\n", "c", overrides);
   const auto water = config.read<Water>("fluid");
   EXPECT_EQ(water.spacing, 1e-3);
   EXPECT_EQ(water.density, 900);
@@ -61,11 +63,13 @@ TEST(Config, a_misspelt_key_names_place_and_nearest_key) {
 }
 
 TEST(Config, another_unit_in_the_key_is_an_unknown_key) {
-  EXPECT_TRUE(contains(error_of("[fluid]\nspacing_mm = 2\nspacing_m = 1\n"), "did you mean 'spacing_m'"));
+  EXPECT_TRUE(
+      contains(error_of("[fluid]\nspacing_mm = 2\nspacing_m = 1\n"), "did you mean 'spacing_m'"));
 }
 
 TEST(Config, a_missing_key_is_named) {
-  EXPECT_TRUE(contains(error_of("[fluid]\ndensity_kg_m3 = 900\n"), "required key 'spacing_m' is missing"));
+  EXPECT_TRUE(
+      contains(error_of("[fluid]\ndensity_kg_m3 = 900\n"), "required key 'spacing_m' is missing"));
 }
 
 TEST(Config, a_misspelt_required_key_is_named_and_not_only_missed) {
@@ -120,7 +124,8 @@ TEST(Config, a_wrong_type_is_refused_with_its_place) {
 
 TEST(Config, ranges_and_choices_are_checked) {
   EXPECT_TRUE(contains(error_of("[fluid]\nspacing_m = -1\n"), "must be greater than zero"));
-  EXPECT_TRUE(contains(error_of("[fluid]\nspacing_m = 1\nscheme = \"explict\"\n"), "did you mean 'explicit'"));
+  EXPECT_TRUE(contains(error_of("[fluid]\nspacing_m = 1\nscheme = \"explict\"\n"),
+                       "did you mean 'explicit'"));
 }
 
 TEST(Config, a_syntax_error_and_an_unknown_table_name_their_line) {
