@@ -207,6 +207,7 @@ public:
     const std::vector<Vec<dim>> at_rest(solver_.walls.position.size(), Vec<dim>::Zero());
     StepClock clock(start_.time, settings_.end_time, settings_.time_step);
     while (!clock.is_over()) {
+      move_walls(start_.scene.prescribed, clock.time(), settings_.time_step, solver_.walls);
       const LimitedStep limited =
           limited_step(solver_.state, solver_.walls, solver_.params(), settings_.time_step);
       const double dt = clock.step_size(limited.size);

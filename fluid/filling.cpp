@@ -272,13 +272,14 @@ private:
 
 // Random displacements of every coordinate by up to `amplitude` [m]; next to a wall by up to half
 // of what keeps the point off it.
-template <int dim> void disturb(double amplitude, const Walls<dim> &walls, Points<dim> &points) {
+template <int dim>
+void disturb(double amplitude, double spacing, const Walls<dim> &walls, Points<dim> &points) {
   std::mt19937_64 random(1); // always the same points
   const auto between = [&] { // -1 and 1, the same on every platform
     return static_cast<double>(random() >> 11) * 0x1p-52 - 1;
   };
   const double reach = 4 * amplitude;
-  const Grid<dim> grid = grid_over(points, reach);
+  const Grid<dim> grid = grid_over(points, std::max(reach, spacing));
   FaceGrid near;
   find_near_faces(walls, grid, reach, near);
   for (Vec<dim> &x : points.position) {
@@ -302,7 +303,7 @@ template <int dim> Points<dim> fill(const FluidParams<dim> &params, const Walls<
   points.position =
       params.is_flooded() ? Flood<dim>(params, walls).points() : points_in_outline(params);
   if (params.start_jitter > 0)
-    disturb(params.start_jitter * params.spacing, walls, points);
+    disturb(params.start_jitter * params.spacing, params.spacing, walls, points);
   const std::size_t n = points.position.size();
   const Formula<dim> start_velocity(params.start_velocity);
   for (const Vec<dim> &x : points.position)

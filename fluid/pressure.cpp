@@ -272,6 +272,7 @@ int release_tension(Points<dim> &points, const Walls<dim> &walls, const Pressure
       if (cloud.kind[j] == PointKind::surface)
         assemble(j);
   }
+  problem.has_open_point = problem.has_open_point || !changed.empty();
   return static_cast<int>(changed.size());
 }
 

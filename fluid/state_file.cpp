@@ -178,8 +178,14 @@ private:
   template <int dim> void check_values(const Points<dim> &points) const {
     for (int i = 0; i < points.size(); ++i) {
       check(points.position[i].allFinite() && points.velocity[i].allFinite() &&
-                points.previous_velocity[i].allFinite() && std::isfinite(points.pressure[i]),
+                points.previous_velocity[i].allFinite() && std::isfinite(points.pressure[i]) &&
+                points.shift[i].allFinite() && points.shift_velocity[i].allFinite() &&
+                points.pressure_gradient[i].allFinite() &&
+                std::isfinite(points.surface_pressure[i]) && std::isfinite(points.strain_rate[i]),
             "{}: point {} has a value that is not finite", name_, i);
+      constexpr std::int32_t largest_id = 1 << 30;
+      check(points.id[i] >= 0 && points.id[i] < largest_id, "{}: point {} has the number {}", name_,
+            i, points.id[i]);
       check(points.at_surface[i] <= SurfaceMemory::released,
             "{}: point {} has the surface mark {}, which does not exist", name_, i,
             static_cast<int>(points.at_surface[i]));

@@ -163,7 +163,9 @@ template <int dim> void FluidSolver<dim>::freeze_cloud() {
 // the last two by backward differences of second order (steps of unequal length: ratio r).
 template <int dim> void FluidSolver<dim>::extrapolate_velocity() {
   const Points<dim> &points = state.points;
-  const bool is_second_order = params_.time_order == 2 && state.step > 0;
+  constexpr double largest_ratio = 2; // of steps: backward differences are stable to 2.4
+  const bool is_second_order =
+      params_.time_order == 2 && state.step > 0 && dt_ <= largest_ratio * state.step_size;
   const double r = is_second_order ? dt_ / state.step_size : 0;
   const double now = (1 + r) * (1 + r) / (1 + 2 * r), before = r * r / (1 + 2 * r);
   projection_dt_ = dt_ * (1 + r) / (1 + 2 * r);
@@ -204,9 +206,24 @@ template <int dim> void FluidSolver<dim>::predict_velocity() {
     report_.viscous_passes = result.passes;
     report_.viscous_rows = viscous_.rows.count;
     for_each_point(points.size(), [&](int i) { predicted_[i] -= push_[i]; });
+  } else {
+    points.surface_pressure.assign(points.size(), 0); // it may come from a run with viscosity
   }
   for_each_point(points.size(), [&](int i) { predicted_[i] += projection_dt_ * params_.gravity; });
 }
+
+namespace {
+
+// Where release_tension does not look at the points: one that was at the surface and is not any
+// more is judged like any other from now on.
+template <int dim> void forget_enclosed_surfaces(const Cloud<dim> &cloud, Points<dim> &points) {
+  for_each_point(points.size(), [&](int i) {
+    if (cloud.kind[i] == PointKind::interior)
+      points.at_surface[i] = SurfaceMemory::enclosed;
+  });
+}
+
+} // namespace
 
 template <int dim> void FluidSolver<dim>::assemble() {
   Points<dim> &points = state.points;
@@ -215,7 +232,9 @@ template <int dim> void FluidSolver<dim>::assemble() {
     volume_restoring_divergence(points, cloud_, params_.motion, pace_.volume, target_divergence_);
     assemble_pressure_source(points, cloud_, pressure_params_, predicted_, target_divergence_,
                              projection_dt_, problem_);
-    if (state.step > 0 && !params_.holds_tension) // the first step has no pressure to judge by
+    if (params_.holds_tension)
+      forget_enclosed_surfaces(cloud_, points);
+    else if (state.step > 0) // the first step has no pressure to judge by
       report_.released = release_tension(points, walls, pressure_params_, predicted_,
                                          target_divergence_, projection_dt_, cloud_, problem_);
   });

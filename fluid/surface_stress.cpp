@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/surface_stress.hpp"
 
+#include "bridge/base/check.hpp"
 #include "fluid/least_squares.hpp"
 #include "fluid/parallel.hpp"
 #include "fluid/weights.hpp"
@@ -107,6 +108,8 @@ void update_surface_pressure(const Cloud<dim> &cloud, std::span<const double> vi
   if (factor * largest > stiff * cloud.spacing * cloud.spacing) {
     const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>> solver(
         surface_diffusion(points, cloud, viscosity, factor, surface));
+    check(solver.info() == Eigen::Success,
+          "the stress at {} surface points cannot be solved for; reduce the time step", n);
     Eigen::Map<Eigen::VectorXd> change(surface.change.data(), n);
     change = solver.solve(change).eval();
   }

@@ -54,8 +54,9 @@ int main(int argc, char **argv) {
   app.add_flag("--check", options.check_only, "read everything, build the mesh, stop");
   app.add_option("--alone", options.task,
                  "without a partner, under its own load or still water: static, modes or release");
-  app.add_option("--restart", options.restart,
-                 "with --alone release: go on from this solid_state.h5");
+  app.add_option(
+      "--restart", options.restart,
+      "go on from this restart file of a coupled run; with --alone release: from a solid_state.h5");
   app.add_option("--water-level", options.water.level, "[m] of that water")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
   const auto ranks = sluice::solid::Ranks::of_launch();

@@ -220,9 +220,9 @@ void Coupling::compare_texts() {
   std::istringstream own_text(config_.text), other_text(there);
   std::string own, other;
   for (int line = 1; there != config_.text; ++line) {
-    std::getline(own_text, own);
-    std::getline(other_text, other);
-    check(own == other,
+    const bool has_own = static_cast<bool>(std::getline(own_text, own));
+    const bool has_other = static_cast<bool>(std::getline(other_text, other));
+    check(has_own && has_other && own == other,
           "precice: the participants read different configurations: line {} is '{}' "
           "for {} and '{}' for {}",
           line, own, name_, other, partner_);
