@@ -167,6 +167,11 @@ public:
   }
 
   std::vector<Vec<dim>> points() const {
+    const Vec<dim> &from = params_.fill_from;
+    check((from.array() >= grid_.origin.array()).all() &&
+              (from.array() <= grid_.top().array()).all(),
+          "fill_from_m = {} m lies outside of all walls, which reach from {} to {} m",
+          text_of(from), text_of(grid_.origin), text_of(grid_.top()));
     const Place start = grid_.place(params_.fill_from);
     check(is_free(start),
           "fill_from_m = {} m is above fill_level_m = {} m or closer than {} m to a wall",

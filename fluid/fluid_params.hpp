@@ -79,9 +79,11 @@ template <int dim> struct FluidParams {
     read("gravity_m_s2", gravity, "acceleration of gravity");
     read("fill_from_m", fill_from,
          "place from which the fluid floods the scene up to fill_level_m");
-    read("fill_level_m", fill_level, "height along y that the flood reaches");
+    read("fill_level_m", fill_level, "height along y that the flood reaches")
+        .check(!is_flooded() || fill_level < no_place, "is missing: fill_from_m needs a level");
     read("water_m", water, "polygon that is filled with points at t = 0")
-        .check(water.size() >= 3 || (water.empty() && is_flooded()), "needs at least three corners")
+        .check(water.size() >= 3 || (water.empty() && is_flooded()),
+               "needs at least three corners (or give fill_from_m and fill_level_m)")
         .check(water.empty() || !is_flooded(), "is not needed where fill_from_m is given");
     auto velocity = read("start_velocity_m_s", start_velocity,
                          "formulas in x, y (z) of the velocity at t = 0; nothing is at rest");

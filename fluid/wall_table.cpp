@@ -213,6 +213,16 @@ void check_surfaces(const std::vector<WallParams<3>> &tables, const Walls<3> &wa
 
 } // namespace
 
+namespace {
+
+// Surfaces from files close themselves: side walls are for what is swept.
+template <int dim> bool has_swept_wall(const std::vector<WallParams<dim>> &tables) {
+  return std::any_of(tables.begin(), tables.end(),
+                     [](const WallParams<dim> &wall) { return wall.file.empty(); });
+}
+
+} // namespace
+
 template <int dim>
 Walls<dim> read_walls(const Config &config, const Sweep &sweep, const SurfaceReader &read_surface,
                       std::vector<PrescribedWall<dim>> &prescribed) {
@@ -228,7 +238,7 @@ Walls<dim> read_walls(const Config &config, const Sweep &sweep, const SurfaceRea
       prescribed.push_back(prescribe(wall, first, walls));
   }
   if constexpr (dim == 3)
-    if (sweep.side_walls != "none")
+    if (sweep.side_walls != "none" && has_swept_wall(tables))
       builder.add_sides(sweep.side_walls);
   link_faces(walls);
   check_surfaces(tables, walls);
