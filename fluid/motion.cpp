@@ -11,8 +11,7 @@
 namespace sluice::fluid {
 
 template <int dim> void move_points(Points<dim> &points, double dt, double previous_dt) {
-  constexpr double largest_ratio = 2; // beyond, the last change of velocity says nothing
-  const double ahead = previous_dt > 0 ? 0.5 * std::min(dt / previous_dt, largest_ratio) : 0.5;
+  const double ahead = previous_dt > 0 ? 0.5 * dt / previous_dt : 0.5;
   for_each_point(points.size(), [&](int i) {
     Vec<dim> &u = points.velocity[i], &old = points.previous_velocity[i];
     points.position[i] += dt * ((1 + ahead) * u - ahead * old) + points.shift[i];
