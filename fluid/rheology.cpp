@@ -32,4 +32,10 @@ Rheology::Rheology(const RheologyParams &params, double newtonian_viscosity) : p
   law_ = make_law(params, newtonian_viscosity);
 }
 
+double Rheology::exponent() const {
+  if (params_.law == "power-law" || params_.law == "carreau-yasuda")
+    return params_.exponent;
+  return params_.law == "herschel-bulkley" ? std::max(params_.exponent, 1.0) : 1;
+}
+
 } // namespace sluice::fluid

@@ -104,9 +104,9 @@ public:
 
   bool is_newtonian() const { return std::holds_alternative<Newtonian>(law_); }
   bool is_inviscid() const { return is_newtonian() && std::get<Newtonian>(law_).viscosity == 0; }
-  /// Largest slope d ln(mu gamma) / d ln gamma: above 1 the fluid thickens and passes over the law
-  /// need under-relaxation.
-  double exponent() const { return params_.exponent; }
+  /// Slope d ln(mu gamma) / d ln gamma where the law is that of a power: above 1 the fluid thickens.
+  /// 1 for laws that have no such range, or one below a yield stress.
+  double exponent() const;
   const RheologyParams &params() const { return params_; }
 
   /// Calls body(viscosity) with a function of the shear rate [1/s] that returns [Pa s]: the choice

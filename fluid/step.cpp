@@ -17,6 +17,8 @@ FluidSolver<dim>::FluidSolver(const Scene<dim> &scene)
   pressure_params_.density = params_.density;
   pressure_params_.row_guard = params_.row_guard;
   pressure_params_.gradient_guard = params_.gradient_guard;
+  if (!params_.rheology.is_newtonian()) // a hundredth of what ends the passes over the law
+    viscous_.relative_tolerance = 0.01 * params_.rheology.params().picard_tolerance;
   cloud_.has_air = params_.free_surface;
   cloud_.remembers_cells = params_.remember_cells;
   nodal_forces_.assign(walls.position.size(), Vec<dim>::Zero());
@@ -170,8 +172,11 @@ template <int dim> void FluidSolver<dim>::extrapolate_velocity() {
   const double now = (1 + r) * (1 + r) / (1 + 2 * r), before = r * r / (1 + 2 * r);
   projection_dt_ = dt_ * (1 + r) / (1 + 2 * r);
   predicted_.resize(points.size());
+  expected_.resize(points.size());
   for_each_point(points.size(), [&](int i) {
-    predicted_[i] = now * points.velocity[i] - before * points.previous_velocity[i];
+    const Vec<dim> &u = points.velocity[i], &old = points.previous_velocity[i];
+    predicted_[i] = now * u - before * old;
+    expected_[i] = u + r * (u - old);
   });
 }
 
@@ -199,7 +204,7 @@ template <int dim> void FluidSolver<dim>::predict_velocity() {
     build_viscous_rows(points, cloud_, params_.rheology, problem_, viscous_.rows);
     const ViscousResult result =
         diffuse_velocity(points, walls, cloud_, params_.rheology, params_.density, projection_dt_,
-                         predicted_, viscous_);
+                         expected_, predicted_, viscous_);
     update_surface_pressure(cloud_, viscosity(), predicted_, projection_dt_ / params_.density,
                             points, surface_);
     report_.viscous_iterations = result.iterations;

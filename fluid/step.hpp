@@ -90,6 +90,7 @@ private:
   PressureProblem<dim> problem_;
   ViscousProblem<dim> viscous_;
   std::vector<Vec<dim>> predicted_; // u* [m/s]
+  std::vector<Vec<dim>> expected_;  // [m/s], at the end of the step, from the steps before
   SurfacePoints surface_;
   std::vector<Vec<dim>> push_; // [m/s]
   std::vector<double> target_divergence_;

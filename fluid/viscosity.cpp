@@ -19,7 +19,7 @@ namespace {
 // the square of it, and four times that is stable.
 constexpr double explicit_limit = 0.02;
 // dt nu / spacing^2 from which the solve is preconditioned by multigrid.
-constexpr double multigrid_limit = 2;
+constexpr double multigrid_limit = 20;
 
 // --- viscosity ----------------------------------------------------------------------------------
 
@@ -75,10 +75,16 @@ void update_velocity_gradient(const Flow<dim> &flow, ViscousProblem<dim> &proble
   });
 }
 
-// Weight of the new viscosity, on a logarithmic scale, where passes do not settle by themselves: 1
-// / n damps the overshoot of thickening fluids. Source: fixed point of mu(gamma(mu)) with d ln mu /
-// d ln gamma = n - 1 at given stress, derived here.
-double relaxation_of(const Rheology &rheology) { return std::min(1.0, 1 / rheology.exponent()); }
+// Weight of the new viscosity, on a logarithmic scale. With d ln mu / d ln gamma = n - 1 a pass
+// multiplies the error of a mode by (1 - n) theta, theta in [0, 1] being the share of viscosity in
+// its balance: w = 2 / (1 + n) makes the factors of both ends (1 - n) / (1 + n) and its opposite,
+// the smallest possible. Derived here.
+double relaxation_of(const Rheology &rheology) { return 2 / (1 + rheology.exponent()); }
+
+// The same where passes do not settle by themselves: 1 / n overshoots nowhere at given stress.
+double cautious_relaxation_of(const Rheology &rheology) {
+  return std::min(1.0, 1 / rheology.exponent());
+}
 
 template <int dim>
 void set_uniform_viscosity(const Rheology &rheology, int n, ViscousProblem<dim> &problem) {
@@ -379,7 +385,8 @@ template <int dim> double shear_rate(const Mat<dim> &gradient) {
 template <int dim>
 ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &walls,
                                const Cloud<dim> &cloud, const Rheology &rheology, double density,
-                               double dt, VecSpan<dim> velocity, ViscousProblem<dim> &problem) {
+                               double dt, VecView<dim> expected, VecSpan<dim> velocity,
+                               ViscousProblem<dim> &problem) {
   const int n = points.size();
   const double factor = dt / density, spacing2 = cloud.spacing * cloud.spacing;
   const ViscousForce<dim> force(walls, cloud, problem, rheology.is_newtonian());
@@ -393,7 +400,7 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
     }
     return factor * largest(problem.viscosity) / spacing2;
   };
-  double stiffness = update_viscosity(velocity, 1);
+  double stiffness = update_viscosity(expected, 1);
   ViscousResult result;
   if (stiffness < explicit_limit) {
     apply_explicitly(force, factor, velocity, problem.source);
@@ -404,10 +411,10 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
   problem.solution.resize(dim * n);
   for (int i = 0; i < n; ++i)
     for (int a = 0; a < dim; ++a)
-      problem.solution[dim * i + a] = velocity[i][a];
-  std::vector<Vec<dim>> latest(velocity.begin(), velocity.end());
+      problem.solution[dim * i + a] = expected[i][a];
+  std::vector<Vec<dim>> latest(velocity.size());
   const RheologyParams &law = rheology.params();
-  double relaxation = 1, last_change = std::numeric_limits<double>::infinity();
+  double relaxation = relaxation_of(rheology), last_change = std::numeric_limits<double>::infinity();
   for (;;) {
     problem.previous = problem.solution;
     fill(force, cloud, factor, velocity, problem);
@@ -417,13 +424,11 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
     if (rheology.is_newtonian() || result.passes == law.picard_passes)
       break;
     const double change = relative_change(problem.solution, problem.previous);
-    if (result.passes > 1) {
-      if (change < law.picard_tolerance)
-        break;
-      if (change > 0.5 * last_change)
-        relaxation = relaxation_of(rheology);
-      last_change = change;
-    }
+    if (change < law.picard_tolerance)
+      break;
+    if (change > 0.5 * last_change)
+      relaxation = cautious_relaxation_of(rheology);
+    last_change = change;
     stiffness = update_viscosity(latest, relaxation);
   }
   std::copy(latest.begin(), latest.end(), velocity.begin());
@@ -432,11 +437,11 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
 
 template double shear_rate(const Mat<2> &);
 template ViscousResult diffuse_velocity(const Points<2> &, const Walls<2> &, const Cloud<2> &,
-                                        const Rheology &, double, double, VecSpan<2>,
+                                        const Rheology &, double, double, VecView<2>, VecSpan<2>,
                                         ViscousProblem<2> &);
 template double shear_rate(const Mat<3> &);
 template ViscousResult diffuse_velocity(const Points<3> &, const Walls<3> &, const Cloud<3> &,
-                                        const Rheology &, double, double, VecSpan<3>,
+                                        const Rheology &, double, double, VecView<3>, VecSpan<3>,
                                         ViscousProblem<3> &);
 
 } // namespace sluice::fluid

@@ -45,11 +45,13 @@ struct ViscousResult {
 
 /// Diffuses `velocity` [m/s] over `dt` [s] in a fluid of the given density [kg/m^3]; walls move
 /// with their velocity. The law is evaluated anew until the velocity changes by less than its
-/// tolerance. Throws UserError when a solve does not converge.
+/// tolerance, for the first time at `expected` [m/s], what the velocity may be afterwards: the
+/// better it is, the fewer passes. Throws UserError when a solve does not converge.
 template <int dim>
 ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &walls,
                                const Cloud<dim> &cloud, const Rheology &rheology, double density,
-                               double dt, VecSpan<dim> velocity, ViscousProblem<dim> &problem);
+                               double dt, VecView<dim> expected, VecSpan<dim> velocity,
+                               ViscousProblem<dim> &problem);
 
 /// Shear rate sqrt(2 E : E) [1/s] of a velocity gradient.
 template <int dim> double shear_rate(const Mat<dim> &gradient);

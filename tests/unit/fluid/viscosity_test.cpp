@@ -29,7 +29,7 @@ std::vector<Vec<2>> diffused(const FrozenCloud &frozen, std::vector<Vec<2>> u, d
   ViscousProblem<2> problem;
   build_rows(frozen, problem);
   for (int n = 0; n < steps; ++n)
-    diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(nu), 1, dt, u, problem);
+    diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(nu), 1, dt, u, u, problem);
   return u;
 }
 
@@ -156,7 +156,7 @@ TEST(Viscosity, LetsAFreeDropSpinWhateverItsViscosity) {
     ViscousProblem<2> problem;
     problem.relative_tolerance = 1e-13;
     build_rows(frozen, problem);
-    diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(viscosity), 1, 0.1, u,
+    diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(viscosity), 1, 0.1, u, u,
                      problem);
     for (int i = 0; i < frozen.size(); ++i)
       ASSERT_NEAR((u[i] - before[i]).norm(), 0, 1e-9) << viscosity;
@@ -176,7 +176,7 @@ TEST(Viscosity, MakesAFreeDropMoveLikeARigidBodyWhenItIsLarge) {
   law.law = "power-law";
   law.consistency = 100;
   for (int n = 0; n < 2; ++n)
-    diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(law, 1), 1, 1, u, problem);
+    diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(law, 1), 1, 1, u, u, problem);
   double strain = 0;
   for (const Mat<2> &gradient : problem.velocity_gradient)
     strain = std::max(strain, shear_rate(gradient));
@@ -258,7 +258,7 @@ public:
     for (int n = 0; n < steps; ++n) {
       for (Vec<2> &v : u)
         v.x() += dt; // of the force: the exact profile is what the step then leaves
-      diffuse_velocity(frozen_->points, frozen_->walls, frozen_->cloud, Rheology(law, 1), 1, dt, u,
+      diffuse_velocity(frozen_->points, frozen_->walls, frozen_->cloud, Rheology(law, 1), 1, dt, u, u,
                        problem);
     }
     double largest = 0, square = 0;
