@@ -17,14 +17,29 @@ namespace sluice::fluid {
 namespace {
 
 // Radius of an empty ball through a point that counts as air, in spacings. A lattice has 0.71 in
-// the plane and 0.87 in space, a well kept cloud less than 0.9 and 1.0. The lower value holds for
-// points that were open before: a flag that would flicker between them keeps its state.
+// the plane and 0.87 in space, a well kept cloud less than 0.9 and 1.0. Next to the surface a point
+// emerges between the lower value and the upper one.
 constexpr double open_ratio = 1.2;
-constexpr double close_ratio = 1.0;
+template <int dim> constexpr double emerging_ratio = dim == 2 ? 0.9 : 1.05;
 // Distance to which an open cell is followed into the air, in spacings.
 constexpr double horizon = 1.5;
-// A cell that is open on both sides has its centroid near the point; on one side 0.5 spacings off.
+// A cell that is open on one side has its centroid 0.5 spacings off; one that is open on both, or
+// through a narrow gap, near the point.
 constexpr double thin_ratio = 0.2;
+// Largest deviation of a surface point's depth from half a spacing, in spacings.
+constexpr double shallowest = 0.45;
+
+// Unit vector to the side on which corners lie beyond `limit` [m]; zero where that is not one side.
+template <int dim> Vec<dim> open_side(const VoronoiCell<dim> &cell, double limit) {
+  Vec<dim> sum = Vec<dim>::Zero();
+  for (int k = 0; k < cell.size(); ++k)
+    if (cell.corner(k).norm() > limit)
+      sum += (1 - limit / cell.corner(k).norm()) * cell.corner(k);
+  for (int k = 0; k < cell.size(); ++k)
+    if (cell.corner(k).norm() > limit && cell.corner(k).dot(sum) <= 0)
+      return Vec<dim>::Zero();
+  return sum.normalized();
+}
 
 template <int dim>
 void find_walls(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &cloud) {
@@ -123,13 +138,13 @@ public:
 
 private:
   double limit_of(int i) const {
-    const bool was_open = points_.at_surface[i] == SurfaceMemory::open;
-    return cloud_.has_air ? (was_open ? close_ratio : open_ratio) * cloud_.spacing
-                          : std::numeric_limits<double>::infinity();
+    return cloud_.has_air ? open_ratio * cloud_.spacing : std::numeric_limits<double>::infinity();
   }
 
   void set_closed(int i, double volume, const Vec<dim> &centroid) const {
+    cloud_.openness[i] = 0;
     cloud_.surface_normal[i] = Vec<dim>::Zero();
+    cloud_.surface_depth[i] = 0;
     cloud_.kind[i] = PointKind::interior;
     cloud_.centroid_offset[i] = centroid;
     cloud_.cell_volume[i] = volume;
@@ -138,18 +153,48 @@ private:
   /// Cuts one cell; true when it is closed and its neighbours are remembered.
   bool cut(int i) const {
     const VoronoiCell<dim> cell = cell_of(i);
-    const Vec<dim> offset = cell.centroid();
     if (cell.reach() <= limit_of(i)) {
-      set_closed(i, cell.volume(), offset);
-      return remember(i, cell);
+      set_closed(i, cell.volume(), cell.centroid());
+      return is_emerging(cell) ? set_emerging(i, cell) : remember(i, cell);
     }
     points_.at_surface[i] = SurfaceMemory::open;
-    cloud_.centroid_offset[i] = offset;
-    const bool is_thin = offset.norm() < thin_ratio * cloud_.spacing;
+    const Vec<dim> normal = outward(cell);
+    const bool is_thin = normal.isZero();
     cloud_.kind[i] = is_thin ? PointKind::thin : PointKind::surface;
-    cloud_.surface_normal[i] = is_thin ? Vec<dim>(Vec<dim>::Zero()) : Vec<dim>(offset.normalized());
-    cloud_.cell_volume[i] = enveloped_volume(cell, cloud_.surface_normal[i], cloud_.kind[i]);
+    const VoronoiCell<dim> inside = enveloped(cell, normal, cloud_.kind[i]);
+    cloud_.openness[i] = 1;
+    cloud_.surface_normal[i] = normal;
+    cloud_.surface_depth[i] = is_thin ? 0 : depth_of(inside, normal);
+    cloud_.centroid_offset[i] = inside.centroid();
+    cloud_.cell_volume[i] = inside.volume();
     return false;
+  }
+
+  bool is_emerging(const VoronoiCell<dim> &cell) const {
+    return cloud_.has_air && cell.reach() > emerging_ratio<dim> * cloud_.spacing;
+  }
+
+  /// An interior point whose cell opens: how far it is on the way to a surface point. Its row
+  /// passes from the one to the other without a jump of the pressure, which would kick the points
+  /// around.
+  bool set_emerging(int i, const VoronoiCell<dim> &cell) const {
+    const Vec<dim> normal = outward(cell);
+    if (normal.isZero())
+      return false;
+    const double from = emerging_ratio<dim>,
+                 x = (cell.reach() / cloud_.spacing - from) / (open_ratio - from);
+    cloud_.openness[i] = x * x * (3 - 2 * x);
+    cloud_.surface_normal[i] = normal;
+    cloud_.surface_depth[i] = depth_of(enveloped(cell, normal, PointKind::surface), normal);
+    return false;
+  }
+
+  // Unit vector out of the fluid; zero where that is on both sides.
+  Vec<dim> outward(const VoronoiCell<dim> &cell) const {
+    const Vec<dim> offset = cell.centroid();
+    const bool is_centred = offset.norm() < thin_ratio * cloud_.spacing;
+    return is_centred ? open_side(cell, emerging_ratio<dim> * cloud_.spacing)
+                      : Vec<dim>(offset.normalized());
   }
 
   // --- cells that are known -----------------------------------------------------------------
@@ -166,11 +211,13 @@ private:
   /// Sets those of the cells in `lanes` that the memory knows and that are closed; returns them.
   unsigned take_known(const PackedStencil<2> &s, unsigned lanes) const {
     const PackedCells cells = known_cells(s, points_, cloud_, cloud_.cell_memory);
-    const double in_sight = 0.5 * cloud_.radius; // a corner there is as far from points in no list
+    // A corner that far is as far from points in no list; one half as far may be at the surface.
+    const double known_limit = std::min(
+        0.5 * cloud_.radius, cloud_.has_air ? emerging_ratio<2> * cloud_.spacing : HUGE_VAL);
     lanes &= bits_of(cells.is_known);
     for (unsigned rest = lanes; rest != 0; rest &= rest - 1) {
       const int l = std::countr_zero(rest), i = s.first() + l;
-      if (std::sqrt(cells.reach2[l]) <= std::min(limit_of(i), in_sight))
+      if (std::sqrt(cells.reach2[l]) <= known_limit)
         set_closed(i, cells.volume[l], {cells.centroid[0][l], cells.centroid[1][l]});
       else
         lanes &= ~(1u << l);
@@ -214,13 +261,27 @@ private:
   }
 
   // The part of an open cell that counts as fluid: up to half a spacing outside the point.
-  double enveloped_volume(VoronoiCell<dim> cell, const Vec<dim> &normal, PointKind kind) const {
+  VoronoiCell<dim> enveloped(VoronoiCell<dim> cell, const Vec<dim> &normal, PointKind kind) const {
     const double limit = kind == PointKind::thin ? lone_apothem_ : cloud_.spacing;
     for (const Vec<dim> &n : directions_of_ball<dim>())
       cell.cut(n, limit);
     if (kind == PointKind::surface)
       cell.cut(normal, 0.5 * cloud_.spacing);
-    return cell.volume();
+    return cell;
+  }
+
+  // How far outside its point the surface lies, so that the cell holds the volume of a point: where
+  // points stand apart along the surface they form a thinner layer. `cell` ends half a spacing
+  // outside; its width is that of its outermost slice. Derived here.
+  double depth_of(VoronoiCell<dim> cell, const Vec<dim> &normal) const {
+    const double h = cloud_.spacing, slice = 0.1 * h, volume = cell.volume();
+    cell.cut(normal, 0.5 * h - slice);
+    const double width = (volume - cell.volume()) / slice;
+    const double missing = volume_of_point<dim>(h) - volume;
+    const double limit = shallowest * h;
+    return width * limit > std::abs(missing) ? 0.5 * h + missing / width
+           : missing > 0                     ? 0.5 * h + limit
+                                             : 0.5 * h - limit;
   }
 
   // A ball-like cell of this apothem, in spacings, has the volume of one point.
@@ -255,10 +316,32 @@ void update_neighbours(const Points<dim> &points, const Walls<dim> &walls, Cloud
   slice_lists(cloud.neighbours, cloud.slices);
 }
 
+namespace {
+
+// Holes in the interior are no surface: only points next to open ones emerge.
+template <int dim> void close_far_from_surface(const Points<dim> &points, Cloud<dim> &cloud) {
+  const double near = 1.5 * cloud.spacing;
+  for_each_point(points.size(), [&](int i) {
+    if (cloud.kind[i] != PointKind::interior || cloud.openness[i] == 0)
+      return;
+    for (const int j : cloud.neighbours.of(i))
+      if (cloud.kind[j] != PointKind::interior &&
+          (points.position[j] - points.position[i]).squaredNorm() < near * near)
+        return;
+    cloud.openness[i] = 0;
+    cloud.surface_normal[i] = Vec<dim>::Zero();
+    cloud.surface_depth[i] = 0;
+  });
+}
+
+} // namespace
+
 template <int dim> void update_cells(Points<dim> &points, Cloud<dim> &cloud) {
   const int n = points.size();
   cloud.kind.resize(n);
   cloud.surface_normal.resize(n);
+  cloud.openness.resize(n);
+  cloud.surface_depth.resize(n);
   cloud.cell_volume.resize(n);
   cloud.centroid_offset.resize(n);
   if constexpr (dim == 2) {
@@ -276,6 +359,7 @@ template <int dim> void update_cells(Points<dim> &points, Cloud<dim> &cloud) {
         return std::array<double, 1>{static_cast<double>(cut)};
       },
       Work::heavy)[0]);
+  close_far_from_surface(points, cloud);
 }
 
 template void update_walls(Points<2> &, const Walls<2> &, double, Cloud<2> &);

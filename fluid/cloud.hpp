@@ -46,6 +46,10 @@ template <int dim> struct Cloud {
   std::vector<PointWalls<dim>> point_walls; // projections within the kernel radius
   std::vector<PointKind> kind;
   std::vector<Vec<dim>> surface_normal;  // unit, out of the fluid; zero for interior points
+  std::vector<double> openness;          // 1: open, 0: interior; between: an interior point that
+                                         // comes up to the surface [-]
+  std::vector<double> surface_depth;     // of such a point below the surface, as far as its
+                                         // volume reaches [m]
   std::vector<double> cell_volume;       // [m^dim]; that of the surface envelope at open cells
   std::vector<Vec<dim>> centroid_offset; // cell centroid minus position [m]
 
@@ -71,8 +75,8 @@ template <int dim>
 void update_neighbours(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &cloud);
 
 /// Voronoi cells and point kinds; needs neighbours and projections. A hole counts as air when the
-/// radius of an empty ball through the point exceeds 1.2 spacings, or 1.0 for a point that was
-/// open in the last step. Marks open points so for the next step.
+/// radius of an empty ball through the point exceeds 1.2 spacings; an interior point next to an
+/// open one emerges from 0.9 (in space 1.05) on. Marks open points so for the next step.
 template <int dim> void update_cells(Points<dim> &points, Cloud<dim> &cloud);
 
 } // namespace sluice::fluid

@@ -58,7 +58,7 @@ template <int dim> struct FluidParams {
   double pressure_tolerance = 1e-6;
   double row_guard = 0.1;
   double gradient_guard = 20;
-  double noise_damping = 0.5;
+  double noise_damping = 1;
   bool remember_cells = true;
   MotionParams motion;
   Rheology rheology; // from table [fluid.rheology] and `viscosity`
@@ -147,6 +147,9 @@ template <int dim> struct FluidParams {
         .at_least(0);
     read("volume_rate", motion.volume_rate, "decay of volume errors, in units of the pace")
         .at_least(0);
+    read("widest_offset", motion.widest_offset,
+         "farthest that a point lies from the middle of its cell, in spacings")
+        .positive();
     read("closest_pair", motion.closest_pair, "closest distance of two points, in spacings")
         .at_least(0)
         .at_most(0.9);

@@ -103,7 +103,7 @@ template <int dim> Pace pace_of(const Points<dim> &points, double gravity, doubl
   const int n = std::max(points.size(), 1);
   const double speed2 = sum(points.size(), [&](int i) { return points.velocity[i].squaredNorm(); });
   const double speed = std::sqrt(speed2 / n), size = spacing * std::pow(n, 1.0 / dim);
-  return {speed / spacing, 2 * std::numbers::pi * speed / size};
+  return {speed / (2 * spacing), 2 * std::numbers::pi * speed / size};
 }
 
 template <int dim>
@@ -128,7 +128,9 @@ void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cl
       const bool is_interior = cloud.kind[i] == PointKind::interior;
       const double error = 1 - filled[l] / (total[l] * volume);
       const double rate = params.volume_rate * std::max(pace, points.strain_rate[i]);
-      divergence[i] = is_interior ? rate * std::clamp(error, -largest_error, largest_error) : 0.0;
+      divergence[i] = is_interior ? (1 - cloud.openness[i]) * rate *
+                                        std::clamp(error, -largest_error, largest_error)
+                                  : 0.0;
     }
   });
 }
@@ -145,6 +147,13 @@ Vec<dim> push_apart(int i, const Points<dim> &points, const Cloud<dim> &cloud, d
       push += 0.5 * (closest / distance - 1) * r;
   }
   return push;
+}
+
+// Half of what a point lies too far from the middle of its cell.
+template <int dim> Vec<dim> closing_move(const Vec<dim> &offset, double widest) {
+  const double length = offset.norm();
+  return length > widest ? Vec<dim>(0.5 * (1 - widest / length) * offset)
+                         : Vec<dim>(Vec<dim>::Zero());
 }
 
 // Which of the points first .. first + 7 may have a neighbour closer than `closest`.
@@ -182,6 +191,7 @@ template <int dim>
 void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams &params,
                 MatView<dim> velocity_gradient, double dt) {
   const double closest = params.closest_pair * cloud.spacing;
+  const double widest = params.widest_offset * cloud.spacing;
   const double longest = 0.1 * cloud.spacing;
   const auto shift_of = [&](int i, bool is_crowded) {
     const Mat<dim> &g = velocity_gradient[i];
@@ -189,6 +199,7 @@ void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams
     const double strain = std::min(points.strain_rate[i] * dt, 0.25);
     Vec<dim> shift = strain * (params.regularity * cloud.centroid_offset[i] +
                                params.agitation * cloud.spacing * own_direction<dim>(points.id[i]));
+    shift += closing_move<dim>(cloud.centroid_offset[i], widest);
     const Vec<dim> &n = cloud.surface_normal[i];
     shift -= n.dot(shift) * n;
     if (cloud.kind[i] == PointKind::thin)

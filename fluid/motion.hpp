@@ -22,6 +22,8 @@ struct MotionParams {
   double volume_rate = 0.3;
   /// No pair of points stays closer than this many spacings.
   double closest_pair = 0.7;
+  /// No point stays farther from the middle of its cell than this many spacings.
+  double widest_offset = 0.1;
   /// No point stays closer to a wall than this many spacings.
   double wall_clearance = 0.25;
 };
@@ -60,16 +62,17 @@ struct Pace {
 };
 
 /// Next to air volume errors follow the shortest waves: both are their frequency sqrt(g / spacing).
-/// Without gravity: the rms speed over the spacing, and 2 pi times it over the size of the fluid, a
-/// turn of the largest eddy. A divergence that corrects the volume errors of single cells, which
-/// are there on every irregular cloud, at the pace of the points would give a velocity error of
-/// their size that no refinement takes away.
+/// Without gravity: the rms speed over two spacings, the shortest mode, and 2 pi times it over the
+/// size of the fluid, a turn of the largest eddy. A divergence that corrects the volume errors of
+/// single cells, which are there on every irregular cloud, at the pace of the points would give a
+/// velocity error of their size that no refinement takes away.
 template <int dim> Pace pace_of(const Points<dim> &points, double gravity, double spacing);
 
 /// Regularisation to be applied in the next move: towards the cell's centroid at a rate
 /// proportional to the local strain rate (along the surface only, at the free surface), and apart
-/// from a neighbour that is too close; plus an agitation proportional to the strain. Zero in a
-/// fluid at rest whose points keep their distance.
+/// from a neighbour that is too close; plus an agitation proportional to the strain, and half of
+/// what the cell's middle is too far away. Zero in a fluid at rest whose points keep their
+/// distance.
 template <int dim>
 void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams &params,
                 MatView<dim> velocity_gradient, double dt);

@@ -117,7 +117,8 @@ private:
   double source_of(int i) const {
     const double scale = cloud_.spacing * cloud_.spacing;
     const Mat<dim> &gradient = problem_.velocity_gradient[i];
-    double source = factor_ * (gradient.trace() - target_[i]) * scale;
+    const double share = 1 - cloud_.openness[i];
+    double source = share * factor_ * (gradient.trace() - target_[i]) * scale;
     for_each_wall_row(cloud_.walls_of(i), cloud_, [&](int m, const Projection<dim> &p) {
       const Vec<dim> at_wall = velocity_[i] + gradient * (p.point - points_.position[i]);
       WallRow<dim> &wall = problem_.wall_rows[cloud_.wall_slot[i]][m];
@@ -238,6 +239,14 @@ void gradients_with(DatumOfPoint &&datum_of_point, const Points<dim> &points,
   });
 }
 
+// Pressure is zero at the point itself.
+template <int dim> void set_open_at_point(int i, Cloud<dim> &cloud) {
+  cloud.kind[i] = PointKind::thin;
+  cloud.openness[i] = 1;
+  cloud.surface_normal[i] = Vec<dim>::Zero();
+  cloud.surface_depth[i] = 0;
+}
+
 } // namespace
 
 template <int dim>
@@ -256,7 +265,7 @@ int release_tension(Points<dim> &points, const Walls<dim> &walls, const Pressure
       continue;
     points.at_surface[i] = released[i] ? SurfaceMemory::released : SurfaceMemory::enclosed;
     if (released[i]) {
-      cloud.kind[i] = PointKind::thin;
+      set_open_at_point(i, cloud);
       changed.push_back(i);
     }
   }

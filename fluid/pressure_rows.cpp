@@ -137,19 +137,19 @@ RowKind laplacian_row(const Stencil<dim> &s, const Points<dim> &points, const Cl
 }
 
 /// Row of a surface point: pressure falls linearly to zero (or to what acts outside, then p stands
-/// for the difference) at the plane half a spacing outside,
-/// p_i = a D/2 with the slope a fitted to the interior neighbours at depth d_j below the plane:
-/// p_i = D/2 sum w d_j p_j / sum w d_j^2. Exact for hydrostatic pressure; an M-matrix row.
+/// for the difference) at the plane of the surface, at distance D outside,
+/// p_i = a D with the slope a fitted to the interior neighbours at depth d_j below the plane:
+/// p_i = D sum w d_j p_j / sum w d_j^2. Exact for hydrostatic pressure; an M-matrix row.
 template <int dim>
 void surface_row(const Stencil<dim> &s, const Cloud<dim> &cloud, std::span<double> entry) {
   const Vec<dim> &n = cloud.surface_normal[s.i];
-  const double half = 0.5 * cloud.spacing / s.h;
+  const double outside = cloud.surface_depth[s.i] / s.h;
   double denominator = 0;
   std::size_t k = 0;
   for_each_neighbour(s, [&](const Neighbour<dim> &m) {
-    const double depth = half - n.dot(m.q);
-    const bool is_donor = cloud.kind[m.j] == PointKind::interior && depth > half;
-    entry[k++] = is_donor ? -half * m.w * depth : 0.0;
+    const double depth = outside - n.dot(m.q);
+    const bool is_donor = cloud.kind[m.j] == PointKind::interior && depth > outside;
+    entry[k++] = is_donor ? -outside * m.w * depth : 0.0;
     denominator += is_donor ? m.w * depth * depth : 0.0;
   });
   for (double &e : entry)
@@ -168,7 +168,9 @@ template <int dim> void lay_out(const Cloud<dim> &cloud, PressureProblem<dim> &p
   problem.gradient.resize(n);
   problem.row_kind.resize(n);
   problem.velocity_gradient.resize(n);
-  problem.wall_rows.assign(cloud.point_walls.size(), {});
+  problem.wall_rows.resize(cloud.point_walls.size()); // grows in large pieces, unlike assign()
+  std::fill(problem.wall_rows.begin(), problem.wall_rows.end(),
+            std::array<WallRow<dim>, most_projections<dim>>{});
 }
 
 /// What the cloud alone decides: matrix, gradient functionals, weights of the wall data.
@@ -211,7 +213,7 @@ private:
     unsigned regular = 0;
     for (int l = 0; l < s.count(); ++l) {
       const int i = s.first() + l;
-      const bool is_regular = cloud_.kind[i] == PointKind::interior && !has_wall_row(i, cloud_);
+      const bool is_regular = cloud_.openness[i] == 0 && !has_wall_row(i, cloud_);
       regular |= static_cast<unsigned>(is_regular) << l;
     }
     return regular;
@@ -289,8 +291,13 @@ private:
         laplacian_row(s, points_, cloud_, regular ? &fit : nullptr, params_.row_guard, row);
     if (kind != RowKind::quadratic)
       problem_.gradient[s.i] = linear_gradient(s, cloud_);
+    const double share = 1 - cloud_.openness[s.i];
+    for (double &w : row.wall)
+      w *= share;
     set_wall_rows(s, row.wall);
     finish_poisson_row(s, row);
+    if (share < 1)
+      blend_with_surface(s, share, row);
     return kind;
   }
 
@@ -323,6 +330,16 @@ private:
       sum -= a;
     }
     problem_.matrix.diagonal[s.i] = sum > 0 ? sum : 1.0;
+  }
+
+  // A point that comes up to the surface passes from one row to the other without a jump.
+  void blend_with_surface(const Stencil<dim> &s, double share, Row<dim> &row) const {
+    std::array<double, most_neighbours<dim>> at_surface;
+    const std::span<double> entry(at_surface.data(), s.count);
+    surface_row(s, cloud_, entry);
+    const double diagonal = problem_.matrix.diagonal[s.i];
+    for (int k = 0; k < s.count; ++k)
+      row.neighbour[k] = share * row.neighbour[k] + (1 - share) * diagonal * entry[k];
   }
 
   const Points<dim> &points_;

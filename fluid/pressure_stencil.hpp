@@ -60,9 +60,9 @@ void for_each_wall_row(const Stencil<dim> &s, const Cloud<dim> &cloud, Visit &&v
   for_each_wall_row(s.walls, cloud, visit);
 }
 
-/// q of the zero of pressure half a spacing outside an open point; 0: at the point.
+/// q of the zero of pressure outside an open point; 0: at the point.
 template <int dim> Vec<dim> open_side(int i, const Cloud<dim> &cloud) {
-  return 0.5 * cloud.spacing / cloud.radius * cloud.surface_normal[i];
+  return cloud.surface_depth[i] / cloud.radius * cloud.surface_normal[i];
 }
 
 template <int dim>

@@ -104,8 +104,8 @@ public:
 
   bool is_newtonian() const { return std::holds_alternative<Newtonian>(law_); }
   bool is_inviscid() const { return is_newtonian() && std::get<Newtonian>(law_).viscosity == 0; }
-  /// Slope d ln(mu gamma) / d ln gamma where the law is that of a power: above 1 the fluid thickens.
-  /// 1 for laws that have no such range, or one below a yield stress.
+  /// Slope d ln(mu gamma) / d ln gamma where the law is that of a power: above 1 the fluid
+  /// thickens. 1 for laws that have no such range, or one below a yield stress.
   double exponent() const;
   const RheologyParams &params() const { return params_; }
 

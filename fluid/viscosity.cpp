@@ -414,7 +414,8 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
       problem.solution[dim * i + a] = expected[i][a];
   std::vector<Vec<dim>> latest(velocity.size());
   const RheologyParams &law = rheology.params();
-  double relaxation = relaxation_of(rheology), last_change = std::numeric_limits<double>::infinity();
+  double relaxation = relaxation_of(rheology),
+         last_change = std::numeric_limits<double>::infinity();
   for (;;) {
     problem.previous = problem.solution;
     fill(force, cloud, factor, velocity, problem);

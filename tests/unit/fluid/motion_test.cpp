@@ -40,8 +40,9 @@ TEST(VolumeRestoringDivergence, LetsASqueezedCloudGrowAtTheStatedRate) {
     EXPECT_NEAR(d, expected, 1e-12);
 }
 
-TEST(PlanShift, IsZeroOnALatticeUnderShearFreeFlowAndInAnyFluidAtRest) {
-  FrozenCloud regular = tank(), irregular = tank(0.1);
+// The jitter of 0.05 spacings leaves the middle of every cell within the 0.1 that are let be.
+TEST(PlanShift, IsZeroInAFluidAtRestWhoseCellsAreWellKept) {
+  FrozenCloud regular = tank(), irregular = tank(0.05);
   for (FrozenCloud *frozen : {&regular, &irregular}) {
     const std::vector<Mat<2>> no_gradient(frozen->size(), Mat<2>::Zero());
     plan_shift(frozen->points, frozen->cloud, {}, no_gradient, 1e-3);
@@ -59,14 +60,36 @@ TEST(PlanShift, PushesAPairApartThatIsCloserThanTheLimitToBothSidesAlike) {
   x[b].x() -= 0.2 * h; // 0.6 spacings apart
   FrozenCloud frozen(x, testing::polyline({{0, 2}, {0, 0}, {1, 0}, {1, 2}}), h);
   const std::vector<Mat<2>> no_gradient(frozen.size(), Mat<2>::Zero());
-  plan_shift(frozen.points, frozen.cloud, {}, no_gradient, 1e-3);
-  Vec<2> total(0, 0);
+  MotionParams params;
+  params.widest_offset = 1; // only the pair counts
+  plan_shift(frozen.points, frozen.cloud, params, no_gradient, 1e-3);
   for (int i = 0; i < frozen.size(); ++i) {
     const double expected = frozen.points.id[i] == a   ? -0.05 * h
                             : frozen.points.id[i] == b ? 0.05 * h
                                                        : 0.0;
     EXPECT_NEAR(frozen.points.shift[i].x(), expected, 1e-13); // to 0.7 spacings, half each
     EXPECT_NEAR(frozen.points.shift[i].y(), 0, 1e-13);
+  }
+}
+
+// A point of a lattice is gone: the cells around the hole reach half a spacing farther on one side.
+TEST(PlanShift, ClosesHolesAlsoInAFluidAtRest) {
+  auto x = testing::lattice(10, 8, h);
+  const Vec<2> hole = x[44];
+  x.erase(x.begin() + 44);
+  FrozenCloud frozen(x, testing::polyline({{0, 2}, {0, 0}, {1, 0}, {1, 2}}), h);
+  const std::vector<Mat<2>> no_gradient(frozen.size(), Mat<2>::Zero());
+  const MotionParams params;
+  plan_shift(frozen.points, frozen.cloud, params, no_gradient, 1e-3);
+  for (int i = 0; i < frozen.size(); ++i) {
+    const Vec<2> shift = frozen.points.shift[i], offset = frozen.cloud.centroid_offset[i];
+    const double excess = std::max(offset.norm() - params.widest_offset * h, 0.0);
+    EXPECT_NEAR(shift.norm(), 0.5 * excess, 1e-13);
+    if ((frozen.points.position[i] - hole).norm() < 1.1 * h) {
+      EXPECT_GT(shift.norm(), 0);
+      EXPECT_NEAR(shift.normalized().dot((hole - frozen.points.position[i]).normalized()), 1,
+                  1e-12);
+    }
   }
 }
 

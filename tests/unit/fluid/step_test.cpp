@@ -166,14 +166,19 @@ TEST(Step, CellsThatAreKnownFromTheLastStepAreThoseThatAreCutAnew) {
 
 // Lists may grow while the water spreads; their memory grows in large pieces, so most steps need
 // none. One thread, since the first loop of a new one allocates too.
-TEST(Step, AllocatesNothingAfterTheFirstSteps) {
+TEST(Step, MostStepsAllocateNothingAfterTheFirstOnes) {
   const int threads = number_of_threads();
   set_number_of_threads(1);
   FluidSolver<2> solver(testing::scene_of(testing::dam_break));
   advance(solver, 5e-4, 10);
-  const long before = sluice::testing::allocations();
-  advance(solver, 5e-4, 5);
-  EXPECT_EQ(sluice::testing::allocations(), before);
+  int without = 0;
+  constexpr int steps = 20;
+  for (int k = 0; k < steps; ++k) {
+    const long before = sluice::testing::allocations();
+    advance(solver, 5e-4, 1);
+    without += sluice::testing::allocations() == before;
+  }
+  EXPECT_GE(without, 3 * steps / 4);
   set_number_of_threads(threads);
 }
 
