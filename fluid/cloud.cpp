@@ -161,10 +161,12 @@ private:
     const Vec<dim> normal = outward(cell);
     const bool is_thin = normal.isZero();
     cloud_.kind[i] = is_thin ? PointKind::thin : PointKind::surface;
-    const VoronoiCell<dim> inside = enveloped(cell, normal, cloud_.kind[i]);
     cloud_.openness[i] = 1;
     cloud_.surface_normal[i] = normal;
-    cloud_.surface_depth[i] = is_thin ? 0 : depth_of(inside, normal);
+    const VoronoiCell<dim> layer = limited(cell, is_thin ? lone_apothem_ : cloud_.spacing);
+    cloud_.surface_depth[i] = is_thin ? 0 : depth_of(layer, normal);
+    const VoronoiCell<dim> inside =
+        is_thin ? layer : cut_at(layer, normal, cloud_.surface_depth[i]);
     cloud_.centroid_offset[i] = inside.centroid();
     cloud_.cell_volume[i] = inside.volume();
     return false;
@@ -185,7 +187,7 @@ private:
                  x = (cell.reach() / cloud_.spacing - from) / (open_ratio - from);
     cloud_.openness[i] = x * x * (3 - 2 * x);
     cloud_.surface_normal[i] = normal;
-    cloud_.surface_depth[i] = depth_of(enveloped(cell, normal, PointKind::surface), normal);
+    cloud_.surface_depth[i] = depth_of(limited(cell, cloud_.spacing), normal);
     return false;
   }
 
@@ -260,23 +262,25 @@ private:
     return cell;
   }
 
-  // The part of an open cell that counts as fluid: up to half a spacing outside the point.
-  VoronoiCell<dim> enveloped(VoronoiCell<dim> cell, const Vec<dim> &normal, PointKind kind) const {
-    const double limit = kind == PointKind::thin ? lone_apothem_ : cloud_.spacing;
+  // The part of a cell within `apothem` [m] of its point.
+  static VoronoiCell<dim> limited(VoronoiCell<dim> cell, double apothem) {
     for (const Vec<dim> &n : directions_of_ball<dim>())
-      cell.cut(n, limit);
-    if (kind == PointKind::surface)
-      cell.cut(normal, 0.5 * cloud_.spacing);
+      cell.cut(n, apothem);
+    return cell;
+  }
+
+  static VoronoiCell<dim> cut_at(VoronoiCell<dim> cell, const Vec<dim> &normal, double depth) {
+    cell.cut(normal, depth);
     return cell;
   }
 
   // How far outside its point the surface lies, so that the cell holds the volume of a point: where
-  // points stand apart along the surface they form a thinner layer. `cell` ends half a spacing
-  // outside; its width is that of its outermost slice. Derived here.
-  double depth_of(VoronoiCell<dim> cell, const Vec<dim> &normal) const {
-    const double h = cloud_.spacing, slice = 0.1 * h, volume = cell.volume();
-    cell.cut(normal, 0.5 * h - slice);
-    const double width = (volume - cell.volume()) / slice;
+  // points stand apart along the surface they form a thinner layer. Exact for cells that are as
+  // wide there as between 0.4 and 0.5 spacings outside. Derived here.
+  double depth_of(const VoronoiCell<dim> &cell, const Vec<dim> &normal) const {
+    const double h = cloud_.spacing, slice = 0.1 * h;
+    const double volume = cut_at(cell, normal, 0.5 * h).volume();
+    const double width = (volume - cut_at(cell, normal, 0.5 * h - slice).volume()) / slice;
     const double missing = volume_of_point<dim>(h) - volume;
     const double limit = shallowest * h;
     return width * limit > std::abs(missing) ? 0.5 * h + missing / width

@@ -106,32 +106,44 @@ template <int dim> Pace pace_of(const Points<dim> &points, double gravity, doubl
   return {speed / (2 * spacing), 2 * std::numbers::pi * speed / size};
 }
 
+namespace {
+
+// The mean of a value over the interior points around each one, itself among them.
 template <int dim>
-void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cloud,
-                                 const MotionParams &params, double pace,
-                                 std::span<double> divergence) {
-  const double volume = volume_of_point<dim>(cloud.spacing);
-  constexpr double largest_error = 0.3;
+void average(const Points<dim> &points, const Cloud<dim> &cloud, std::span<const double> value,
+             std::span<double> mean) {
   for_each_pack(points.size(), [&](int first) {
     const PackedStencil<dim> s(first, points, cloud);
-    Pack filled = gathered(s.self(), cloud.cell_volume.data()), total = Pack{} + 1;
+    Pack sum = gathered(s.self(), value.data()), total = Pack{} + 1;
     for (int k = 0; k < s.width(); ++k) {
       const int *j = s.neighbours(k);
       const PackMask counts =
           s.has_neighbour(k) & gathered_equal(j, cloud.kind.data(), PointKind::interior);
       const Pack w = counts ? s.weight_at(s.offset(k)) : Pack{};
-      filled += w * gathered(j, cloud.cell_volume.data());
+      sum += w * gathered(j, value.data());
       total += w;
     }
-    for (int l = 0; l < s.count(); ++l) {
-      const int i = first + l;
-      const bool is_interior = cloud.kind[i] == PointKind::interior;
-      const double error = 1 - filled[l] / (total[l] * volume);
-      const double rate = params.volume_rate * std::max(pace, points.strain_rate[i]);
-      divergence[i] = is_interior ? (1 - cloud.openness[i]) * rate *
-                                        std::clamp(error, -largest_error, largest_error)
-                                  : 0.0;
-    }
+    for (int l = 0; l < s.count(); ++l)
+      mean[first + l] = sum[l] / total[l];
+  });
+}
+
+} // namespace
+
+template <int dim>
+void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cloud,
+                                 const MotionParams &params, double pace,
+                                 std::vector<double> &memory, std::span<double> divergence) {
+  const double volume = volume_of_point<dim>(cloud.spacing);
+  constexpr double largest_error = 0.3;
+  memory.resize(points.size());
+  average(points, cloud, cloud.cell_volume, memory);
+  average<dim>(points, cloud, memory, divergence);
+  for_each_point(points.size(), [&](int i) {
+    const double error = std::clamp(1 - divergence[i] / volume, -largest_error, largest_error);
+    const double rate = params.volume_rate * std::max(pace, points.strain_rate[i]);
+    const bool is_interior = cloud.kind[i] == PointKind::interior;
+    divergence[i] = is_interior ? (1 - cloud.openness[i]) * rate * error : 0.0;
   });
 }
 
@@ -225,14 +237,14 @@ template Pace pace_of(const Points<2> &, double, double);
 template ContactCounts<2> keep_clear_of_walls(Points<2> &, const Walls<2> &, const MotionParams &,
                                               const Cloud<2> &);
 template void volume_restoring_divergence(const Points<2> &, const Cloud<2> &, const MotionParams &,
-                                          double, std::span<double>);
+                                          double, std::vector<double> &, std::span<double>);
 template void plan_shift(Points<2> &, const Cloud<2> &, const MotionParams &, MatView<2>, double);
 template void move_points(Points<3> &, double, double);
 template Pace pace_of(const Points<3> &, double, double);
 template ContactCounts<3> keep_clear_of_walls(Points<3> &, const Walls<3> &, const MotionParams &,
                                               const Cloud<3> &);
 template void volume_restoring_divergence(const Points<3> &, const Cloud<3> &, const MotionParams &,
-                                          double, std::span<double>);
+                                          double, std::vector<double> &, std::span<double>);
 template void plan_shift(Points<3> &, const Cloud<3> &, const MotionParams &, MatView<3>, double);
 
 } // namespace sluice::fluid

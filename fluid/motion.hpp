@@ -48,12 +48,14 @@ ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &wa
                                        const MotionParams &params, const Cloud<dim> &cloud);
 
 /// Divergence that brings the cells back to their volume [1/s], zero at the free surface: the
-/// relative volume error, averaged over the neighbours, times volume_rate and the larger of `pace`
-/// [1/s] and the point's strain rate, by which errors come up.
+/// relative volume error, averaged twice over the neighbours (what cells of an irregular cloud
+/// differ by is no lost volume, and a divergence would make it a velocity error), times volume_rate
+/// and the larger of `pace` [1/s] and the point's strain rate, by which errors come up. `memory` is
+/// scratch.
 template <int dim>
 void volume_restoring_divergence(const Points<dim> &points, const Cloud<dim> &cloud,
                                  const MotionParams &params, double pace,
-                                 std::span<double> divergence);
+                                 std::vector<double> &memory, std::span<double> divergence);
 
 /// How fast things happen [1/s].
 struct Pace {

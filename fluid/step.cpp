@@ -234,7 +234,8 @@ template <int dim> void FluidSolver<dim>::assemble() {
   Points<dim> &points = state.points;
   timer("operators", [&] {
     target_divergence_.resize(points.size());
-    volume_restoring_divergence(points, cloud_, params_.motion, pace_.volume, target_divergence_);
+    volume_restoring_divergence(points, cloud_, params_.motion, pace_.volume, cell_average_,
+                                target_divergence_);
     assemble_pressure_source(points, cloud_, pressure_params_, predicted_, target_divergence_,
                              projection_dt_, problem_);
     if (params_.holds_tension)

@@ -94,6 +94,7 @@ private:
   SurfacePoints surface_;
   std::vector<Vec<dim>> push_; // [m/s]
   std::vector<double> target_divergence_;
+  std::vector<double> cell_average_; // memory of the volume control
   std::vector<char> leaves_; // per point
   std::vector<Cell> cells_;  // per point: of the multigrid
   ScaledMatrix scaled_;

@@ -21,8 +21,8 @@ TEST(VolumeRestoringDivergence, IsZeroOnALattice) {
   const FrozenCloud frozen = tank();
   EXPECT_EQ(frozen.count(PointKind::surface), 10);
   EXPECT_EQ(frozen.count(PointKind::interior), 70);
-  std::vector<double> divergence(frozen.size(), 7);
-  volume_restoring_divergence(frozen.points, frozen.cloud, {}, 10.0, divergence);
+  std::vector<double> memory, divergence(frozen.size(), 7);
+  volume_restoring_divergence(frozen.points, frozen.cloud, {}, 10.0, memory, divergence);
   const double rate = MotionParams().volume_rate * 10;
   for (const double d : divergence)
     EXPECT_NEAR(d, 0, 1e-13 * rate); // areas of cells are exact to round-off
@@ -33,8 +33,8 @@ TEST(VolumeRestoringDivergence, LetsASqueezedCloudGrowAtTheStatedRate) {
   for (Vec<2> &p : x)
     p.y() *= 0.9;
   const FrozenCloud frozen(x, testing::closed_box(1, 0.9), h);
-  std::vector<double> divergence(frozen.size());
-  volume_restoring_divergence(frozen.points, frozen.cloud, {}, 10.0, divergence);
+  std::vector<double> memory, divergence(frozen.size());
+  volume_restoring_divergence(frozen.points, frozen.cloud, {}, 10.0, memory, divergence);
   const double expected = 0.1 * MotionParams().volume_rate * 10;
   for (const double d : divergence)
     EXPECT_NEAR(d, expected, 1e-12);
