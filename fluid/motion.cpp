@@ -10,11 +10,10 @@
 
 namespace sluice::fluid {
 
-template <int dim> void move_points(Points<dim> &points, double dt, double previous_dt) {
-  const double ahead = previous_dt > 0 ? 0.5 * dt / previous_dt : 0.5;
+template <int dim> void move_points(Points<dim> &points, double dt, double lead) {
   for_each_point(points.size(), [&](int i) {
     Vec<dim> &u = points.velocity[i], &old = points.previous_velocity[i];
-    points.position[i] += dt * ((1 + ahead) * u - ahead * old) + points.shift[i];
+    points.position[i] += dt * (u + lead * (u - old)) + points.shift[i];
     u += points.shift_velocity[i];
     old += points.shift_velocity[i];
     points.shift[i].setZero();

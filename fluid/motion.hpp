@@ -34,11 +34,13 @@ template <int dim> struct ContactCounts {
   Vec<dim> velocity_change = Vec<dim>::Zero(); // sum over the points [m/s]
 };
 
-/// Advances the points by a step `dt` [s] with the second-order extrapolation of their velocity,
-/// x += dt ((1 + r/2) u^n - r/2 u^{n-1}), r = dt / previous_dt, which from stage to stage is the
-/// trapezoidal rule; then applies the pending regularisation. `previous_dt` [s] is the step that
-/// ended in u^n, 0 before the first. (The cloud lives at the stage positions; derived here.)
-template <int dim> void move_points(Points<dim> &points, double dt, double previous_dt);
+/// Advances the points by a step `dt` [s], x += dt (u^n + lead (u^n - u^{n-1})), then applies the
+/// pending regularisation. `lead` 0 is first order: with forces at the new positions that is the
+/// symplectic Euler method, which keeps angular momentum under central forces and lets no wave
+/// decay (E. Hairer, C. Lubich, G. Wanner, Geometric Numerical Integration, 2nd ed., I.1). With
+/// half the ratio of dt to the step that ended in u^n it is second order, from stage to stage the
+/// trapezoidal rule (the cloud lives at the stage positions; derived here).
+template <int dim> void move_points(Points<dim> &points, double dt, double lead);
 
 /// Puts points that are behind a wall or too close to it back to the clearance and removes their
 /// velocity towards it; two walls on opposite sides leave each at most 0.45 of the gap as

@@ -64,7 +64,7 @@ struct RheologyParams {
   double consistency = 1e-3, exponent = 1;
   double at_rest = 1, at_infinity = 0, time = 1, sharpness = 2;
   double yield_stress = 0, growth = 1000;
-  double lowest_shear_rate = 1e-3;
+  double lowest_shear_rate = 1e-3, highest_shear_rate = 1e300; // [1/s]
   double lowest = 0, highest = 1e9;
   double picard_tolerance = 1e-4;
   int picard_passes = 20;
@@ -85,6 +85,9 @@ struct RheologyParams {
     read("yield_stress_pa", yield_stress, "of bingham and herschel-bulkley").at_least(0);
     read("regularisation_s", growth, "m of the yield stress, after Papanastasiou").positive();
     read("lowest_shear_rate_1_s", lowest_shear_rate, "the law sees no smaller one").positive();
+    read("highest_shear_rate_1_s", highest_shear_rate,
+         "the law sees no larger one: for singular corners, what points resolve")
+        .positive();
     read("lowest_viscosity_pa_s", lowest, "lower bound").at_least(0);
     read("highest_viscosity_pa_s", highest, "upper bound").positive();
     read("picard_tolerance", picard_tolerance,
@@ -117,7 +120,8 @@ public:
     std::visit(
         [&](const auto &law) {
           body([&](double gamma) {
-            const double seen = std::hypot(gamma, params_.lowest_shear_rate);
+            const double seen = std::min(std::hypot(gamma, params_.lowest_shear_rate),
+                                         params_.highest_shear_rate);
             return std::clamp(law(seen), params_.lowest, params_.highest);
           });
         },

@@ -28,7 +28,10 @@ template <int dim> void FluidSolver<dim>::begin_step(double dt) {
   dt_ = dt;
   report_ = {};
   pace_ = pace_of(state.points, params_.gravity.norm(), params_.spacing);
-  timer("move", [&] { move_points(state.points, dt, state.step_size); });
+  timer("move", [&] {
+    const bool knows_change = params_.time_order == 2 && state.step_size > 0;
+    move_points(state.points, dt, knows_change ? 0.5 * dt / state.step_size : 0);
+  });
   freeze_cloud();
   timer("operators", [&] {
     assemble_pressure_operators(state.points, cloud_, pressure_params_, problem_);

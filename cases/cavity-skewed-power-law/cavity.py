@@ -44,7 +44,8 @@ class Cavity:
         return {
             "case": {"time_step_s": self.courant / self.points_per_side},
             "fluid": {"spacing_m": self.spacing, "water_m": c},
-            "fluid.rheology": {"consistency_pa_s_n": 1 / self.reynolds, "exponent": self.exponent},
+            "fluid.rheology": {"consistency_pa_s_n": 1 / self.reynolds, "exponent": self.exponent,
+                               "highest_shear_rate_1_s": self.highest_shear_rate},
             "fluid.wall.sides": {"points_m": [c[3], c[0], c[1], c[2]]},
             "fluid.wall.lid": {"points_m": [c[2], c[3]]},
             "fluid.probe.ab": {"from_m": self.place(0.5, 0), "to_m": self.place(0.5, 1)},
@@ -57,6 +58,15 @@ class Cavity:
     @property
     def spacing(self):
         return math.sqrt(self.sine) / self.points_per_side
+
+    @property
+    def highest_shear_rate(self):
+        """What points resolve: the lid's speed over two spacings along it [1/s].
+
+        Where the lid meets the sides the velocity jumps and the stress of a thickening fluid has no
+        bound; there alone the law is cut off.
+        """
+        return self.points_per_side / 2
 
     @property
     def corners(self):
