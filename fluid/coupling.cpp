@@ -136,16 +136,6 @@ template <int dim> Start<dim> start_of(const Config &config, const bridge::CaseS
   return start;
 }
 
-template <int dim>
-void check_folder(const FluidParams<dim> &params, const std::filesystem::path &folder) {
-  if (params.start_state.empty())
-    return;
-  const auto source = std::filesystem::absolute(params.start_state).parent_path();
-  check(!std::filesystem::equivalent(source, folder),
-        "{}: a run cannot go on in the folder of the run it starts from; choose another --out",
-        params.start_state);
-}
-
 // A lattice that does not fit the corners of the water holds more or less of it.
 template <int dim> void note_volume_error(const Scene<dim> &scene) {
   constexpr double worth_a_note = 0.01;
@@ -198,7 +188,10 @@ public:
         start_(restart.empty() ? start_of<dim>(config, settings_)
                                : restart_of<dim>(config, settings_, restart)),
         solver_(start_.scene), folder_(folder), progress_("fluid", settings_.end_time) {
-    check_folder(start_.scene.params, folder);
+    if (const auto &from = start_.scene.params.start_state; !from.empty())
+      check_is_elsewhere(from, folder);
+    if (!restart.empty())
+      check_is_elsewhere(restart, folder);
     note_volume_error(start_.scene);
   }
 
@@ -305,6 +298,7 @@ private:
 
   // Only a run that really begins touches the files of an earlier one.
   void open_history() {
+    remove_restart_files(folder_, "fluid");
     history_.emplace(start_.scene, solver_, folder_, settings_.output_interval, start_.time);
   }
 

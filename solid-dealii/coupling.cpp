@@ -39,6 +39,7 @@ public:
 
   /// Goes on from the end of a window of another run.
   void restore(Partner bridge, const std::filesystem::path &file) {
+    check_is_elsewhere(file, folder_);
     const std::filesystem::path own = state_file(file, ranks_);
     SavedState saved = read_state(own, state_);
     check(!bridge.speaks() || !saved.bridge.empty(), "{}: not the restart file of a coupled run",
@@ -52,6 +53,8 @@ public:
     bridge.set_mesh(surface_.mesh());
     bridge.initialize();
     // Only now: a partner that never comes must not cost the series of an earlier run.
+    if (bridge.speaks())
+      remove_restart_files(folder_, "solid");
     history_.emplace(solver_, folder_, output_interval_, &state_, start_time_);
     const StopSignal stop_signal;
     while (bridge.is_coupling_ongoing()) {
