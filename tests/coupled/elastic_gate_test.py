@@ -142,6 +142,18 @@ class FluidAloneTest(GateTest):
         self.assertIn("fluid.start_state is for the fluid alone", done.stderr)
 
 
+class FailedStepTest(GateTest):
+    def test_points_that_fly_apart_cost_a_window_and_not_the_run(self):
+        done, out = self.run_gate('fluid.start_velocity_m_s=["0", "1e10 * x"]',
+                                  "bridge.max_halvings=2", "case.output_interval_s=0")
+        self.assertEqual(done.returncode, 1)
+        for part in ("could not be computed by the fluid", "the points spread over",
+                     "it was halved 2 times already"):
+            self.assertIn(part, done.stderr)
+        self.assertEqual(self.column(out, "coupling.csv", "time_s"), [5e-4, 2.5e-4, 1.25e-4])
+        self.assertEqual(json.loads((out / "summary.json").read_text())["halved_windows"], 2)
+
+
 class RestartTest(GateTest):
     """Windows that the fluid refuses are cut; a run that stops goes on as if it had not."""
 
