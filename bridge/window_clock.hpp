@@ -53,6 +53,16 @@ public:
     since_halved_ = 0;
     elapsed_ = 0;
   }
+  /// Before the first window: it starts at `time` [s], at which another run has ended.
+  void start_at(double time) {
+    const double windows = std::round(time / settings_.time_step);
+    if (std::abs(time - windows * settings_.time_step) <= 1e-9 * settings_.time_step) {
+      tick_ = full_ * static_cast<long>(windows);
+      return;
+    }
+    origin_ = time;
+    n_windows_ = settings_.n_windows(origin_);
+  }
   /// Between two windows.
   template <class Archive> void archive(Archive &a) {
     const double end_now = end();

@@ -40,10 +40,9 @@ public:
   /// Goes on from the end of a window of another run.
   void restore(Partner bridge, const std::filesystem::path &file) {
     check_is_elsewhere(file, folder_);
-    const std::filesystem::path own = state_file(file, ranks_);
-    SavedState saved = read_state(own, state_);
+    SavedState saved = read_state(file, state_, ranks_);
     check(!bridge.speaks() || !saved.bridge.empty(), "{}: not the restart file of a coupled run",
-          own.string());
+          file.string());
     bridge.restore(saved.bridge);
     state_ = std::move(saved.state);
     start_time_ = saved.time;
@@ -73,8 +72,10 @@ public:
         state_ = start_;
       } else if (bridge.is_time_window_complete()) {
         finish_window(bridge);
-        if (bridge.requires_writing_restart())
+        if (bridge.requires_writing_restart()) {
           write_restart(bridge);
+          solver_.start_anew();
+        }
       }
     }
     bridge.finalize();
@@ -92,7 +93,7 @@ public:
 private:
   void write_restart(const Partner &bridge) const {
     const auto file = restart_file(folder_, "solid", bridge.time_window() - 1);
-    write_state(state_file(file, ranks_), {state_, bridge.time(), bridge.saved_state()});
+    write_state(file, {state_, bridge.time(), bridge.saved_state()}, ranks_);
     if (bridge.speaks())
       remove_older_restart_files(folder_, "solid");
   }

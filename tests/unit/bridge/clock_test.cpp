@@ -69,6 +69,18 @@ TEST(WindowClock, a_later_end_goes_on_from_where_a_cut_window_has_ended) {
   }
 }
 
+TEST(WindowClock, starts_where_a_run_has_ended_whose_last_window_was_cut_or_was_not) {
+  for (const double start : {1.0, 1.1}) {
+    WindowClock clock(times(3.0, 0.5));
+    clock.start_at(start);
+    EXPECT_EQ(clock.time(), start);
+    EXPECT_EQ(clock.window_length(), 0.5);
+    while (!clock.is_over())
+      clock.next_window();
+    EXPECT_EQ(clock.time(), 3.0);
+  }
+}
+
 // Nothing was cut, or the end is the same: not a bit of the clock may change.
 TEST(WindowClock, a_clock_that_is_restored_ticks_on_as_if_it_had_not_been) {
   for (const double end : {1.5, 1.1}) {
