@@ -122,9 +122,10 @@ Start<dim> restart_of(const Config &config, const bridge::CaseSettings &settings
 /// The water as filled, or as another run left it.
 template <int dim> Start<dim> start_of(const Config &config, const bridge::CaseSettings &settings) {
   Start<dim> start{.scene = read_scene<dim>(config, read_surface_file)};
-  const FluidParams<dim> &params = start.scene.params;
+  FluidParams<dim> &params = start.scene.params;
   if (params.start_state.empty())
     return start;
+  params.start_state = std::filesystem::path(config.file_name()).parent_path() / params.start_state;
   SavedState<dim> saved = read_fitting_state(params.start_state, start.scene, settings);
   check(!has_partner(start.scene),
         "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s; a "
