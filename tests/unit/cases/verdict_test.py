@@ -75,7 +75,7 @@ class ValidateTest(unittest.TestCase):
             run.series("fluid.csv")
         status, said, _, _ = self.run_with(judge, completed=True)
         self.assertEqual(status, 1)
-        self.assertRegex(said, r"validate: .*fluid\.csv: is not there")
+        self.assertRegex(said, r"INCOMPLETE: .*fluid\.csv: is not there")
 
 
 if __name__ == "__main__":
