@@ -130,9 +130,7 @@ std::vector<std::string> lines_of(const std::string &text) {
     return k < lines.size() ? fmt::format("'{}'", lines[k]) : std::string("nothing more");
   };
   fail("bridge: the two programs read different case files (or got different --set options, or "
-       "restart "
-       "files of different windows): the {} "
-       "has {}, the {} has {}",
+       "restart files of different windows or runs): the {} has {}, the {} has {}",
        name_of(self), line(a), name_of(partner_of(self)), line(b));
 }
 

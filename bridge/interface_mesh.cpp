@@ -27,8 +27,10 @@ void check_shape(const InterfaceMesh &mesh, std::string_view owner) {
 }
 
 void check_positions(const InterfaceMesh &mesh, std::string_view owner) {
+  constexpr double farthest = 1e100; // [m], squares of distances must not overflow
   for (std::size_t k = 0; k < mesh.positions.size(); ++k)
-    check(std::isfinite(mesh.positions[k]), "bridge: node {} of the {}'s interface mesh is at {} m",
+    check(std::abs(mesh.positions[k]) < farthest, // not so for what is no number, either
+          "bridge: node {} of the {}'s interface mesh is at {} m",
           k / static_cast<std::size_t>(mesh.dim), owner, mesh.positions[k]);
 }
 

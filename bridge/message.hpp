@@ -34,7 +34,7 @@ template <class T> struct Uninitialised : std::allocator<T> {
 };
 using Bytes = std::vector<std::byte, Uninitialised<std::byte>>;
 
-inline constexpr std::uint16_t protocol_version = 4;
+inline constexpr std::uint16_t protocol_version = 5;
 inline constexpr std::size_t header_size = 32; // [bytes]
 
 enum class FrameType : std::uint16_t {

@@ -103,7 +103,8 @@ public:
   // Last in what the two sides compare at connect.
   std::string start_line() const {
     return saved.empty() ? "start = first window"
-                         : fmt::format("start = after window {} (restart)", clock.window() - 1);
+                         : fmt::format("start = after window {} of run {:016x} (restart)",
+                                       clock.window() - 1, saved_run);
   }
 
   /// Beside what the two sides of the bridge save by themselves.
@@ -113,7 +114,7 @@ public:
   std::vector<std::byte> saved_state() {
     StateWriter state;
     std::string name = name_of(role), text = text_that_must_stay(case_text);
-    state(name, text);
+    state(name, text, side->run);
     archive(state);
     side->save(state);
     return state.bytes();
@@ -121,19 +122,20 @@ public:
   void restore(std::span<const std::byte> bytes) {
     check(!link, "bridge: restore comes before initialize");
     saved.assign(bytes.begin(), bytes.end());
-    StateReader state = begin_reading();
+    StateReader state = begin_reading(saved_run);
     archive(state);
   }
   void restore_side() {
-    StateReader state = begin_reading();
+    StateReader state = begin_reading(saved_run);
     archive(state);
     side->restore(state);
     state.finish();
   }
-  StateReader begin_reading() const {
+  // `run`: the number of the run that saved the state.
+  StateReader begin_reading(std::uint64_t &run) const {
     StateReader state(saved);
     std::string name, text;
-    state(name, text);
+    state(name, text, run);
     check(name == name_of(role), "bridge: the {} was given the {}'s restart file", name_of(role),
           name);
     check_same_coupling(text, text_that_must_stay(case_text));
@@ -220,6 +222,7 @@ public:
   bool is_rejected = false;
   bool must_enter_window = false;
   std::vector<std::byte> saved; // of the run that this one goes on from
+  std::uint64_t saved_run = 0;  // its number
   bool must_write_restart = false;
   bool wants_to_stop = false, is_stopped = false;
   bool is_silent = false; // goodbye or abort said

@@ -100,9 +100,16 @@ void DistributedParticipant::act(const std::function<void(Participant &)> &actio
   is_over_ = !problem.empty();
   check(problem.empty(), "{}", problem);
   if (bridge_)
-    state_ = {bridge_->is_coupling_ongoing(),         bridge_->is_time_window_complete(),
-              bridge_->requires_writing_checkpoint(), bridge_->requires_reading_checkpoint(),
-              bridge_->max_time_step_size(),          bridge_->time()};
+    state_ = {bridge_->is_coupling_ongoing(),
+              bridge_->is_time_window_complete(),
+              bridge_->requires_writing_checkpoint(),
+              bridge_->requires_reading_checkpoint(),
+              bridge_->requires_writing_restart(),
+              bridge_->is_stopped(),
+              bridge_->iteration(),
+              bridge_->time_window(),
+              bridge_->max_time_step_size(),
+              bridge_->time()};
   MPI_Bcast(&state_, sizeof state_, MPI_BYTE, 0, ranks_);
 }
 
@@ -150,6 +157,18 @@ void DistributedParticipant::set_mesh(const InterfaceMesh &part, std::span<const
     whole.positions = whole_;
     bridge.set_mesh(std::move(whole));
   });
+}
+
+void DistributedParticipant::restore(std::span<const std::byte> saved) {
+  agree();
+  act([&](Participant &bridge) { bridge.restore(saved); });
+}
+
+std::vector<std::byte> DistributedParticipant::saved_state() {
+  agree();
+  std::vector<std::byte> bytes;
+  act([&](Participant &bridge) { bytes = bridge.saved_state(); });
+  return bytes;
 }
 
 void DistributedParticipant::initialize() {
@@ -212,7 +231,14 @@ void DistributedParticipant::report_failure(std::string_view reason) {
 
 void DistributedParticipant::advance(double dt) {
   agree();
-  act([&](Participant &bridge) { bridge.advance(dt); });
+  const int own = wants_to_stop_;
+  int any = 0;
+  MPI_Reduce(&own, &any, 1, MPI_INT, MPI_MAX, 0, ranks_);
+  act([&](Participant &bridge) {
+    if (any != 0)
+      bridge.request_stop();
+    bridge.advance(dt);
+  });
 }
 
 void DistributedParticipant::finalize() {

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: MIT
 // A participant whose solver runs on several MPI ranks: the verbs of participant.hpp, each called
 // by all ranks together. Rank 0 holds the bridge; data are gathered there and handed out from
-// there. What fails on one rank is thrown on all of them, and the partner is told.
+// there. What fails on one rank is thrown on all of them, and the partner is told. What a restart
+// needs is rank 0's, and so is the bridge's part of the restart file.
 #pragma once
 
 #include "bridge/participant.hpp"
@@ -23,6 +24,8 @@ public:
   /// `part` is this rank's part of the surface, node `a` of it the node `numbers[a]` of the whole,
   /// counted from 0 without gaps. Ranks may share nodes; a rank may have none (dim still set).
   void set_mesh(const InterfaceMesh &part, std::span<const int> numbers);
+  /// `saved` counts on rank 0.
+  void restore(std::span<const std::byte> saved);
   void initialize();
 
   bool is_coupling_ongoing() const { return state_.is_ongoing != 0; }
@@ -31,6 +34,15 @@ public:
   bool requires_writing_checkpoint() const { return state_.must_write != 0; }
   bool requires_reading_checkpoint() const { return state_.must_read != 0; }
   double time() const { return state_.time; }
+  long time_window() const { return state_.time_window; }
+  int iteration() const { return state_.iteration; }
+
+  bool requires_writing_restart() const { return state_.must_write_restart != 0; }
+  /// On rank 0; empty on the others.
+  std::vector<std::byte> saved_state();
+  /// By one rank alone or several; all of them learn of it in the next advance.
+  void request_stop() { wants_to_stop_ = true; }
+  bool is_stopped() const { return state_.is_stopped != 0; }
 
   /// This rank's values, dim per node of its part. Where ranks share a node, its forces are summed,
   /// and of displacement and velocity the lowest rank's count.
@@ -48,6 +60,8 @@ public:
 private:
   struct State { // of rank 0's participant
     int is_ongoing = 1, is_complete = 0, must_write = 0, must_read = 0;
+    int must_write_restart = 0, is_stopped = 0, iteration = 1;
+    long time_window = 1;
     double max_time_step_size = 0, time = 0;
   };
   void agree(const std::string &problem = "");
@@ -63,6 +77,7 @@ private:
   std::unique_ptr<Participant> bridge_; // rank 0
   State state_;
   bool is_over_ = false; // all ranks know of the end
+  bool wants_to_stop_ = false;
   int dim_ = 2;
   std::size_t n_own_ = 0;            // values of this rank
   std::vector<int> numbers_;         // rank 0: of all nodes, rank by rank

@@ -27,12 +27,15 @@ struct CaseSettings {
                            windows(), end_time, most_windows));
     read("output_interval_s", output_interval, "time between written fields").at_least(0);
   }
-  /// Number of windows; the last one is shorter when end_time is no multiple of time_step.
-  long n_windows() const { return std::lround(windows()); }
+  /// Number of windows from `start` [s] on; the last one is shorter when what is left is no
+  /// multiple of time_step.
+  long n_windows(double start = 0) const { return std::lround(windows(start)); }
 
 private:
   static constexpr double most_windows = 1e9; // months of computing; far from what a long holds
-  double windows() const { return std::max(0.0, std::ceil(end_time / time_step - 1e-6)); }
+  double windows(double start = 0) const {
+    return std::max(0.0, std::ceil((end_time - start) / time_step - 1e-6));
+  }
 };
 
 /// Table [bridge]: how the participants talk, and how a window is iterated.

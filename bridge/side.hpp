@@ -64,6 +64,7 @@ public:
   std::map<std::string, WindowField, std::less<>> readable;
   std::map<std::string, std::vector<double>, std::less<>> writable;
   bool stops_here = false; ///< agreed by both at the end of a window
+  std::uint64_t run = 0;   ///< number of this run, drawn by the fluid; after initialize
 };
 
 std::unique_ptr<Side> make_fluid_side(const BridgeSettings &settings);

@@ -3,6 +3,8 @@
 #include "bridge/base/check.hpp"
 #include "bridge/side.hpp"
 
+#include <random>
+
 namespace sluice::bridge {
 
 namespace {
@@ -20,6 +22,12 @@ MapKind kind_of(const std::string &mapping) {
   if (mapping == "mortar")
     return MapKind::mortar;
   return mapping == "rbf" ? MapKind::rbf : MapKind::projection;
+}
+
+// No two runs have the same one.
+std::uint64_t drawn_number() {
+  std::random_device draw;
+  return std::uint64_t{draw()} << 32 | draw();
 }
 
 // A plane fluid sums per metre, a solid in space over its depth.
@@ -98,7 +106,9 @@ public:
 
 private:
   void send_report(Link &link) {
+    run = drawn_number();
     PayloadWriter payload;
+    payload.number(run);
     write_report(payload, map_.report());
     payload.borrowed(forces_on_solid());
     link.send(FrameType::map_report, std::move(payload));

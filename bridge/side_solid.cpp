@@ -105,6 +105,7 @@ private:
   void receive_report(Link &link, std::vector<double> &initial_forces) {
     link.receive(FrameType::map_report, record_limit(n_values_), "the fluid's map",
                  [&](PayloadReader &read) {
+                   run = read.number();
                    report_ = read_report(read);
                    read.reals(initial_forces);
                    return 0;

@@ -85,5 +85,23 @@ module sluice
       import
       type(c_ptr), value :: participant
     end function
+    integer(c_size_t) function length_of(text) bind(c, name='strlen')
+      import
+      type(c_ptr), value :: text
+    end function
   end interface
+  private :: length_of
+contains
+  !> What sluice_message says, as a text of Fortran.
+  function sluice_text(participant) result(text)
+    type(c_ptr), value :: participant
+    character(len=:), allocatable :: text
+    character(kind=c_char), pointer :: letters(:)
+    integer :: k
+    call c_f_pointer(sluice_message(participant), letters, [length_of(sluice_message(participant))])
+    allocate (character(len=size(letters)) :: text)
+    do k = 1, size(letters)
+      text(k:k) = letters(k)
+    end do
+  end function
 end module

@@ -195,6 +195,13 @@ void send_at_once(int descriptor) {
   ::setsockopt(descriptor, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
 }
 
+// A sender that the buffer cannot take in is woken for every part of its frame; the kernel's default
+// is 200 kB. TCP's buffers grow by themselves.
+void take_much_at_once(int descriptor) {
+  const int size = 1 << 20; // [bytes], as far as net.core.wmem_max allows
+  ::setsockopt(descriptor, SOL_SOCKET, SO_SNDBUF, &size, sizeof size);
+}
+
 // The other end of a Unix-domain connection must run under this user (or root).
 bool is_own_user(int descriptor) {
   ucred peer{};
@@ -294,6 +301,8 @@ namespace {
 // What the two speak over once they have met; nothing when the other end is gone already.
 std::unique_ptr<Transport> transport_over(SocketHandle socket, Address::Family family,
                                           bool is_listener, Deadline deadline) {
+  if (family == Address::Family::unix_domain)
+    take_much_at_once(socket.get());
   if (family != Address::Family::shared_memory)
     return std::make_unique<SocketTransport>(std::move(socket));
   try {

@@ -105,7 +105,10 @@ def check_rows(checks, outside="outside"):
 def validate(folder, judge):
     """Judges one run, writes and prints what was found; returns the exit status."""
     run = RunFolder(folder)
-    found = judge(run)
+    try:
+        found = judge(run)
+    except RunError as error:  # too short for what is to be measured, say
+        found = Verdict(incomplete=str(error))
     if found.incomplete is None and not run.summary.get("completed"):
         found.incomplete = f"ended at {run.summary.get('end_time_s', 0):.4g} s"
     found.write(run)

@@ -122,9 +122,10 @@ Start<dim> restart_of(const Config &config, const bridge::CaseSettings &settings
 /// The water as filled, or as another run left it.
 template <int dim> Start<dim> start_of(const Config &config, const bridge::CaseSettings &settings) {
   Start<dim> start{.scene = read_scene<dim>(config, read_surface_file)};
-  const FluidParams<dim> &params = start.scene.params;
+  FluidParams<dim> &params = start.scene.params;
   if (params.start_state.empty())
     return start;
+  params.start_state = std::filesystem::path(config.file_name()).parent_path() / params.start_state;
   SavedState<dim> saved = read_fitting_state(params.start_state, start.scene, settings);
   check(!has_partner(start.scene),
         "fluid.start_state is for the fluid alone: the solid would start at t = 0, not at {} s; a "
@@ -134,16 +135,6 @@ template <int dim> Start<dim> start_of(const Config &config, const bridge::CaseS
   check_clear_of_walls(start.scene, params.motion.wall_clearance * params.spacing);
   start.time = saved.time;
   return start;
-}
-
-template <int dim>
-void check_folder(const FluidParams<dim> &params, const std::filesystem::path &folder) {
-  if (params.start_state.empty())
-    return;
-  const auto source = std::filesystem::absolute(params.start_state).parent_path();
-  check(!std::filesystem::equivalent(source, folder),
-        "{}: a run cannot go on in the folder of the run it starts from; choose another --out",
-        params.start_state);
 }
 
 // A lattice that does not fit the corners of the water holds more or less of it.
@@ -198,37 +189,40 @@ public:
         start_(restart.empty() ? start_of<dim>(config, settings_)
                                : restart_of<dim>(config, settings_, restart)),
         solver_(start_.scene), folder_(folder), progress_("fluid", settings_.end_time) {
-    check_folder(start_.scene.params, folder);
+    if (const auto &from = start_.scene.params.start_state; !from.empty())
+      check_is_elsewhere(from, folder);
+    if (!restart.empty())
+      check_is_elsewhere(restart, folder);
     note_volume_error(start_.scene);
   }
 
   void alone() {
     open_history();
-    const std::vector<Vec<dim>> at_rest(solver_.walls.position.size(), Vec<dim>::Zero());
+    const std::vector<Vec<dim>> at_rest(solver_->walls.position.size(), Vec<dim>::Zero());
     StepClock clock(start_.time, settings_.end_time, settings_.time_step);
     while (!clock.is_over()) {
-      move_walls(start_.scene.prescribed, clock.time(), settings_.time_step, solver_.walls);
+      move_walls(start_.scene.prescribed, clock.time(), settings_.time_step, solver_->walls);
       const LimitedStep limited =
-          limited_step(solver_.state, solver_.walls, solver_.params(), settings_.time_step);
+          limited_step(solver_->state, solver_->walls, solver_->params(), settings_.time_step);
       const double dt = clock.step_size(limited.size);
-      move_walls(start_.scene.prescribed, clock.time(), dt, solver_.walls);
-      solver_.begin_step(dt);
-      solver_.iterate();
-      solver_.end_step();
+      move_walls(start_.scene.prescribed, clock.time(), dt, solver_->walls);
+      solver_->begin_step(dt);
+      solver_->iterate();
+      solver_->end_step();
       clock.pass(dt);
       history_->count(limited);
-      finish_step(interface_totals(solver_, at_rest, at_rest),
+      finish_step(interface_totals(*solver_, at_rest, at_rest),
                   std::min(clock.time(), settings_.end_time));
     }
   }
 
   void coupled(bridge::Participant &bridge) {
-    CoupledSurface<dim> surface(solver_.walls);
-    bridge.set_mesh(surface.mesh(solver_.walls));
+    CoupledSurface<dim> surface(solver_->walls);
+    bridge.set_mesh(surface.mesh(solver_->walls));
     if (!start_.bridge.empty())
       bridge.restore(start_.bridge);
     bridge.initialize();
-    surface.read_positions(bridge, 0, solver_.walls);
+    surface.read_positions(bridge, 0, solver_->walls);
     open_history();
     const StopSignal stop_signal;
     const bool repeats_steps = bridge.settings().iterate == "full";
@@ -238,30 +232,32 @@ public:
       const bool is_first = bridge.iteration() == 1;
       const bool repeats_step = repeats_steps && bridge.iteration() <= most_full_iterations;
       if (is_first && bridge.requires_reading_checkpoint()) // the same window, half as long
-        solver_.state = saved_;
+        solver_->state = saved_;
       if (is_first) {
-        surface.read_positions(bridge, 0, solver_.walls);
+        surface.read_positions(bridge, 0, solver_->walls);
         moved_from_ = surface.displacement();
         if (repeats_steps || may_halve)
-          saved_ = solver_.state;
+          saved_ = solver_->state;
       } else if (repeats_step) {
-        solver_.state = saved_;
+        solver_->state = saved_;
       }
-      surface.read_velocities(bridge, dt, solver_.walls);
+      surface.read_velocities(bridge, dt, solver_->walls);
       iterate(bridge, surface, dt, is_first || repeats_step);
       if (stop_signal.has_come())
         bridge.request_stop();
       bridge.advance(dt);
       if (!bridge.is_time_window_complete())
         continue;
-      solver_.end_step();
-      surface.read_positions(bridge, 0, solver_.walls);
+      solver_->end_step();
+      surface.read_positions(bridge, 0, solver_->walls);
       const bridge::InterfaceTotals loads =
-          interface_totals(solver_, moved_from_, surface.displacement());
+          interface_totals(*solver_, moved_from_, surface.displacement());
       bridge.report_totals(loads);
       finish_step(loads, bridge.time());
-      if (bridge.requires_writing_restart())
+      if (bridge.requires_writing_restart()) {
         write_restart(bridge);
+        start_anew();
+      }
     }
     bridge.finalize();
     check(!bridge.is_stopped(),
@@ -271,58 +267,82 @@ public:
 
   void write_summary(const std::string &message, const nlohmann::json &bridge_summary) const {
     if (history_)
-      history_->write_summary(solver_, message, bridge_summary);
+      history_->write_summary(*solver_, message, bridge_summary);
   }
   bool has_partner() const { return fluid::has_partner(start_.scene); }
 
 private:
-  // A step that cannot be done at its length is the bridge's to cut; where it may not, it ends both
-  // programs with the reason.
   void iterate(bridge::Participant &bridge, CoupledSurface<dim> &surface, double dt, bool moves) {
+    if (moves)
+      surface.read_positions(bridge, dt, solver_->walls);
+    const std::string failure = failure_of([&] { compute(bridge.time(), dt, moves); });
+    if (failure.empty())
+      surface.write_forces(bridge, *solver_);
+    else
+      bridge.report_failure(failure);
+  }
+
+  void compute(double time, double dt, bool moves) {
+    if (moves) {
+      check_step(dt);
+      move_walls(start_.scene.prescribed, time, dt, solver_->walls);
+      solver_->begin_step(dt);
+    }
+    solver_->iterate();
+  }
+
+  // Whatever keeps the solver from doing a step (a solve that does not converge, points that fly
+  // apart) may not in a shorter one, which is the bridge's to try; where it may not, it ends both
+  // programs with the reason.
+  template <class Step> static std::string failure_of(Step &&step) {
     try {
-      if (moves) {
-        check_step(dt);
-        surface.read_positions(bridge, dt, solver_.walls);
-        move_walls(start_.scene.prescribed, bridge.time(), dt, solver_.walls);
-        solver_.begin_step(dt);
-      }
-      solver_.iterate();
-      surface.write_forces(bridge, solver_);
-    } catch (const NoStep &failure) {
-      bridge.report_failure(failure.what());
+      step();
+      return "";
+    } catch (const UserError &failure) {
+      return failure.what();
     }
   }
 
   void check_step(double dt) const {
     const auto [size, limit] =
-        limited_by_motion(solver_.state, solver_.walls, solver_.params(), settings_.time_step);
+        limited_by_motion(solver_->state, solver_->walls, solver_->params(), settings_.time_step);
     if (dt > size * (1 + 1e-9))
-      throw NoStep(fmt::format("step {}: {:.3g} s is longer than fluid.courant = {} allows "
-                               "({:.3g} s, {})",
-                               solver_.state.step + 1, dt, solver_.params().courant, size,
-                               step_limit_names[static_cast<std::size_t>(limit)]));
+      fail("step {}: {:.3g} s is longer than fluid.courant = {} allows ({:.3g} s, {})",
+           solver_->state.step + 1, dt, solver_->params().courant, size,
+           step_limit_names[static_cast<std::size_t>(limit)]);
   }
 
   // Only a run that really begins touches the files of an earlier one.
   void open_history() {
-    history_.emplace(start_.scene, solver_, folder_, settings_.output_interval, start_.time);
+    remove_restart_files(folder_, "fluid");
+    history_.emplace(start_.scene, *solver_, folder_, settings_.output_interval, start_.time);
   }
 
   void write_restart(const bridge::Participant &bridge) const {
     write_state<dim>(
         restart_file(folder_, "fluid", bridge.time_window() - 1),
-        {solver_.state, bridge.time(), solver_.params().spacing, bridge.saved_state()});
+        {solver_->state, bridge.time(), solver_->params().spacing, bridge.saved_state()});
     remove_older_restart_files(folder_, "fluid");
   }
 
+  // As the run that will go on from the file: whatever the solver remembers beside its state
+  // (cells, memory of the solvers) is built anew in both.
+  void start_anew() {
+    Scene<dim> scene = start_.scene;
+    scene.initial = std::move(solver_->state);
+    PhaseTimer timer = std::move(solver_->timer);
+    solver_.emplace(scene);
+    solver_->timer = std::move(timer);
+  }
+
   void finish_step(const bridge::InterfaceTotals &loads, double time) {
-    solver_.timer("record", [&] { history_->record(solver_, loads, time); });
+    solver_->timer("record", [&] { history_->record(*solver_, loads, time); });
     progress_.update(time, history_->note());
   }
 
   bridge::CaseSettings settings_;
   Start<dim> start_;
-  FluidSolver<dim> solver_;
+  std::optional<FluidSolver<dim>> solver_;
   std::filesystem::path folder_;
   std::optional<History<dim>> history_;
   Progress progress_;

@@ -81,9 +81,13 @@ template <int dim> struct FluidParams {
          "place from which the fluid floods the scene up to fill_level_m");
     read("fill_level_m", fill_level, "height along y that the flood reaches")
         .check(!is_flooded() || fill_level < no_place, "is missing: fill_from_m needs a level");
+    read("start_state", start_state,
+         "file fluid_state.h5 of a run to go on from, relative to the case file; the water is that "
+         "of the file");
     read("water_m", water, "polygon that is filled with points at t = 0")
-        .check(water.size() >= 3 || (water.empty() && is_flooded()),
-               "needs at least three corners (or give fill_from_m and fill_level_m)")
+        .check(
+            water.size() >= 3 || (water.empty() && (is_flooded() || !start_state.empty())),
+            "needs at least three corners (or give fill_from_m and fill_level_m, or start_state)")
         .check(water.empty() || !is_flooded(), "is not needed where fill_from_m is given");
     auto velocity = read("start_velocity_m_s", start_velocity,
                          "formulas in x, y (z) of the velocity at t = 0; nothing is at rest");
@@ -112,8 +116,6 @@ template <int dim> struct FluidParams {
     read("holds_tension", holds_tension,
          "points next to air may pull: for a drop or a patch held together by nothing else");
     read("coupled_walls", coupled_walls, "what coupled walls do").one_of({"move", "stay"});
-    read("start_state", start_state,
-         "file fluid_state.h5 of a run to go on from, instead of filling water_m");
     read("fields", fields, "of the points, written every case.output_interval_s")
         .check(unknown_field(fields).empty(),
                fmt::format("names '{}'; valid are {}", unknown_field(fields),

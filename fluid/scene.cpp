@@ -60,6 +60,8 @@ template <int dim> Scene<dim> read_scene(const Config &config, const SurfaceRead
       gauge.z = 0.5 * scene.params.depth;
   scene.probes = config.read_all<ProbeParams<dim>>("fluid.probe");
   check_names(scene.probes, "probe");
+  if (!scene.params.start_state.empty())
+    return scene; // its water is in that file
   scene.initial.points = fill(scene.params, scene.walls);
   check_clear_of_walls(scene, 0);
   if (!scene.params.open_sides && scene.params.gravity.norm() > 0 && !scene.params.is_flooded())

@@ -86,10 +86,9 @@ void run_release(SolidSolver<dim> &s, const Hydrostatic &water,
   if (restart.empty())
     state.acceleration = s.consistent_acceleration(state, load);
   else {
-    const SavedState saved = read_state(state_file(restart, s.ranks()), state);
+    const SavedState saved = read_state(restart, state, s.ranks());
     state = saved.state;
-    while (!clock.is_over() && clock.time() < saved.time - 1e-9 * settings.time_step)
-      clock.next_window();
+    clock.start_at(saved.time);
   }
   History<dim> history(s, folder, settings.output_interval, &state, clock.time());
   std::optional<Progress> progress;

@@ -39,10 +39,10 @@ public:
 
   /// Goes on from the end of a window of another run.
   void restore(Partner bridge, const std::filesystem::path &file) {
-    const std::filesystem::path own = state_file(file, ranks_);
-    SavedState saved = read_state(own, state_);
+    check_is_elsewhere(file, folder_);
+    SavedState saved = read_state(file, state_, ranks_);
     check(!bridge.speaks() || !saved.bridge.empty(), "{}: not the restart file of a coupled run",
-          own.string());
+          file.string());
     bridge.restore(saved.bridge);
     state_ = std::move(saved.state);
     start_time_ = saved.time;
@@ -52,6 +52,8 @@ public:
     bridge.set_mesh(surface_.mesh());
     bridge.initialize();
     // Only now: a partner that never comes must not cost the series of an earlier run.
+    if (bridge.speaks())
+      remove_restart_files(folder_, "solid");
     history_.emplace(solver_, folder_, output_interval_, &state_, start_time_);
     const StopSignal stop_signal;
     while (bridge.is_coupling_ongoing()) {
@@ -70,8 +72,10 @@ public:
         state_ = start_;
       } else if (bridge.is_time_window_complete()) {
         finish_window(bridge);
-        if (bridge.requires_writing_restart())
+        if (bridge.requires_writing_restart()) {
           write_restart(bridge);
+          solver_.start_anew();
+        }
       }
     }
     bridge.finalize();
@@ -89,7 +93,7 @@ public:
 private:
   void write_restart(const Partner &bridge) const {
     const auto file = restart_file(folder_, "solid", bridge.time_window() - 1);
-    write_state(state_file(file, ranks_), {state_, bridge.time(), bridge.saved_state()});
+    write_state(file, {state_, bridge.time(), bridge.saved_state()}, ranks_);
     if (bridge.speaks())
       remove_older_restart_files(folder_, "solid");
   }

@@ -17,8 +17,7 @@ namespace sluice::solid {
 /// Runs the case to its end, writing into `folder` once the partner is met. Throws UserError on any
 /// failure, after the partner has been told and the summary of what was computed has been written.
 /// On several ranks all of them call it, and the root speaks to the partner.
-/// `restart`, unless empty: the restart file that the run goes on from; on several ranks each
-/// reads its own (state_file).
+/// `restart`, unless empty: the restart file that the run goes on from, on as many ranks.
 void run(const Config &config, const std::filesystem::path &folder,
          const std::filesystem::path &restart = {}, const Ranks &ranks = {});
 

@@ -120,7 +120,7 @@ template <int dim> void History<dim>::write_fields(const SolidState &state, doub
   const auto energy = solver_.assembly().energy_of_cells(state.displacement, state.modes);
   fields_->write(time, {state.displacement, state.velocity, pressure_of(stress),
                         von_mises_of(stress), stress, energy});
-  write_state(state_file(folder_ / "solid_state.h5", solver_.ranks()), {state, time});
+  write_state(folder_ / "solid_state.h5", {state, time}, solver_.ranks());
   fields_written_ = std::lround(std::floor(time / output_interval_ * (1 + 1e-9))) + 1;
   output_seconds_ += watch.seconds();
 }

@@ -22,6 +22,7 @@ public:
     return umfpack_.info() == Eigen::Success;
   }
   Eigen::VectorXd solve(const Eigen::VectorXd &right) override { return umfpack_.solve(right); }
+  void forget() override {} // factors are of the last matrix alone
 
 private:
   Eigen::UmfPackLU<Eigen::SparseMatrix<double>> umfpack_;
@@ -54,6 +55,7 @@ bool LinearSolver::factorise(const Eigen::SparseMatrix<double> &matrix) {
   return method_->factorise(matrix);
 }
 Eigen::VectorXd LinearSolver::solve(const Eigen::VectorXd &right) { return method_->solve(right); }
+void LinearSolver::forget() { method_->forget(); }
 int LinearSolver::last_iterations() const { return method_->last_iterations; }
 int LinearSolver::set_ups() const { return method_->set_ups; }
 

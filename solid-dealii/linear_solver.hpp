@@ -59,6 +59,8 @@ public:
   /// Solves with the last matrix factorised, which must still exist. Not finite where the iteration
   /// does not converge.
   Eigen::VectorXd solve(const Eigen::VectorXd &right);
+  /// What it kept of earlier matrices: the next one is solved with the bits of a new solver.
+  void forget();
   int last_iterations() const; ///< of conjugate gradients or MINRES; 0 for the direct solver
   int set_ups() const;         ///< of the multigrid since the start
 

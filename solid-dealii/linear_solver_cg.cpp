@@ -10,6 +10,7 @@
 #include <Epetra_Vector.h>
 #include <Teuchos_ParameterList.hpp>
 #include <ml_MultiLevelPreconditioner.h>
+#include <ml_utils.h>
 
 #include <cmath>
 #include <vector>
@@ -47,6 +48,11 @@ public:
     else
       needs_set_up_ = true;
     return x;
+  }
+
+  void forget() override {
+    multigrid_.reset();
+    needs_set_up_ = true;
   }
 
 private:
@@ -173,6 +179,7 @@ private:
       if (const int row = motions_.first + i; !is_filled[static_cast<std::size_t>(i)])
         copy_->InsertGlobalValues(row, 1, &diagonal, &row);
     copy_->GlobalAssemble();
+    ML_set_random_seed(1 + motions_.ranks.rank()); // every set-up guesses eigenvalues from the same
     multigrid_ = std::make_unique<ML_Epetra::MultiLevelPreconditioner>(*copy_, settings(), true);
     ++set_ups;
     is_fresh_ = true;

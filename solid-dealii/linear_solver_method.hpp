@@ -11,6 +11,7 @@ public:
   virtual ~Method() = default;
   virtual bool factorise(const Eigen::SparseMatrix<double> &matrix) = 0;
   virtual Eigen::VectorXd solve(const Eigen::VectorXd &right) = 0;
+  virtual void forget() = 0;
 
   int last_iterations = 0;
   int set_ups = 0;

@@ -61,6 +61,7 @@ public:
   /// force (viscosity.hpp).
   NewtonReport solve(const Equation &equation, Iterate &iterate,
                      const Overstress<dim> &overstress = {});
+  void forget() { linear_solver_.forget(); } ///< (LinearSolver)
 
 private:
   struct Residual {

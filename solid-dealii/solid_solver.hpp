@@ -50,6 +50,10 @@ public:
   SolidState advance(const SolidState &start, const Eigen::VectorXd &load, double window,
                      const SolidState *guess = nullptr);
 
+  /// At a checkpoint: the next step has the bits that a solver gives which was made for it, whatever
+  /// the linear solver had kept of earlier ones.
+  void start_anew() { newton_.forget(); }
+
   /// Equilibrium under a dead load and the body's own, raised in parts where one part is too much.
   SolidState solve_static(const Eigen::VectorXd &load);
   /// Equilibrium under `load(displacement)`, a load that follows the body, e.g. a pressure.

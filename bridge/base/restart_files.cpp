@@ -32,6 +32,15 @@ std::set<long> windows_of(const std::filesystem::path &folder, const std::string
   return windows;
 }
 
+void remove_but_last(std::size_t most, const std::filesystem::path &folder,
+                     const std::string &participant) {
+  const std::set<long> windows = windows_of(folder, participant);
+  std::size_t left = windows.size();
+  for (const long window : windows)
+    if (left-- > most)
+      std::filesystem::remove(restart_file(folder, participant, window));
+}
+
 } // namespace
 
 std::filesystem::path restart_file(const std::filesystem::path &folder,
@@ -41,11 +50,18 @@ std::filesystem::path restart_file(const std::filesystem::path &folder,
 
 void remove_older_restart_files(const std::filesystem::path &folder,
                                 const std::string &participant) {
-  const std::set<long> windows = windows_of(folder, participant);
-  std::size_t left = windows.size();
-  for (const long window : windows)
-    if (left-- > kept)
-      std::filesystem::remove(restart_file(folder, participant, window));
+  remove_but_last(kept, folder, participant);
+}
+
+void remove_restart_files(const std::filesystem::path &folder, const std::string &participant) {
+  remove_but_last(0, folder, participant);
+}
+
+void check_is_elsewhere(const std::filesystem::path &file, const std::filesystem::path &folder) {
+  std::error_code error; // a file that is not there is found missing when it is read
+  check(!std::filesystem::equivalent(std::filesystem::absolute(file).parent_path(), folder, error),
+        "{}: a run cannot go on in the folder of the run it starts from; choose another --out",
+        folder.string());
 }
 
 std::map<std::string, std::filesystem::path>

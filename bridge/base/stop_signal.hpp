@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
-// SIGTERM as a wish: while this object lives, the first one is noted and the program goes on to a
-// place where it can stop; a second one ends it as usual.
+// SIGTERM as a wish: while this object lives it is noted, and the program goes on to a place where
+// it can stop. A second one is the same wish: what ends a job often tells every process of it
+// twice.
 #pragma once
 
 #include <csignal>
@@ -13,7 +14,7 @@ public:
     has_come_ = 0;
     struct sigaction action {};
     action.sa_handler = [](int) { has_come_ = 1; };
-    action.sa_flags = SA_RESTART | static_cast<int>(SA_RESETHAND);
+    action.sa_flags = SA_RESTART;
     sigaction(SIGTERM, &action, &before_);
   }
   ~StopSignal() { sigaction(SIGTERM, &before_, nullptr); }

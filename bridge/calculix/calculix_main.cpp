@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
-// sluice-calculix CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--check] [--print-box]
+// sluice-calculix CASE.toml [--set TABLE.KEY=VALUE]... [--out DIR] [--restart FILE] [--check]
+//                           [--print-box]
 #include "bridge/calculix/box_deck.hpp"
 #include "bridge/calculix/ccx.hpp"
 #include "bridge/calculix/coupling.hpp"
@@ -11,7 +12,7 @@
 namespace {
 
 struct Options {
-  std::string case_file, out = "out";
+  std::string case_file, out = "out", restart;
   std::vector<std::string> overrides;
   bool check_only = false, print_box = false;
 };
@@ -42,7 +43,7 @@ void run(const Options &options) {
   if (options.check_only)
     return print_check(config);
   std::filesystem::create_directories(options.out);
-  calculix::run(config, options.out);
+  calculix::run(config, options.out, options.restart);
 }
 
 } // namespace
@@ -54,6 +55,7 @@ int main(int argc, char **argv) {
   app.add_option("--set", options.overrides, "TABLE.KEY=VALUE overrides one value; repeatable")
       ->allow_extra_args(false);
   app.add_option("--out", options.out, "folder for all output")->capture_default_str();
+  app.add_option("--restart", options.restart, "restart file that the run goes on from");
   app.add_flag("--check", options.check_only, "read everything, look for ccx, stop");
   app.add_flag("--print-box", options.print_box, "print the input file of the box, stop");
   CLI11_PARSE(app, argc, argv);

@@ -8,18 +8,18 @@
 namespace sluice::calculix {
 
 History::History(const Deck &deck, std::vector<int> probe, std::filesystem::path folder,
-                 double output_interval)
+                 double output_interval, const Motion &start, long windows)
     : folder_(std::move(folder)), output_interval_(output_interval), probe_(std::move(probe)),
       n_elements_(deck.elements.size()),
       loads_(folder_ / "solid_loads.csv",
              "window,time_s,fx_n,fy_n,moment_nm,magnitude_n,moment_magnitude_nm,work_j,"
-             "work_magnitude_j") {
+             "work_magnitude_j"),
+      windows_(windows) {
   if (!probe_.empty())
     tip_.emplace(folder_ / "tip.csv", "time_s,ux_m,uy_m,uz_m");
   if (output_interval > 0)
     fields_.emplace(deck, folder_);
-  const NodeField rest = NodeField::Zero(3, deck.nodes.rbegin()->first);
-  record_state({rest, rest, 0}, 0);
+  record_state(start, start.time);
 }
 
 void History::record(const Motion &motion, const bridge::InterfaceTotals &loads, double time) {

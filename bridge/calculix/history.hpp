@@ -21,10 +21,11 @@ namespace sluice::calculix {
 
 class History {
 public:
-  /// Fields are written every `output_interval` [s]; 0: none. Writes the state at rest at once.
-  /// `probe` are the nodes of the probe set, empty for none.
+  /// Fields are written every `output_interval` [s]; 0: none. Writes `start`, the state before the
+  /// first window, at once; `windows` are those that led to it. `probe` are the nodes of the probe
+  /// set, empty for none.
   History(const Deck &deck, std::vector<int> probe, std::filesystem::path folder,
-          double output_interval);
+          double output_interval, const Motion &start, long windows);
 
   /// The window that led to `motion` at `time` [s], with the sums of its loads.
   void record(const Motion &motion, const bridge::InterfaceTotals &loads, double time);
@@ -45,7 +46,7 @@ private:
   CsvWriter loads_;
   std::optional<OutputVtu> fields_;
   long fields_written_ = 0;
-  long windows_ = 0;
+  long windows_;
   double output_seconds_ = 0;
   double last_time_ = 0;
   Vec<3> last_tip_ = Vec<3>::Zero();

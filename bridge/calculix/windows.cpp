@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <iterator>
 
 namespace sluice::calculix {
 
@@ -75,6 +76,27 @@ void Windows::accept() {
   fs::rename(ccx_.folder() / "window.rout", ccx_.folder() / "window.rin");
   time_ = end_time_;
   ++accepted_;
+}
+
+std::vector<std::byte> Windows::saved() const {
+  const fs::path file = ccx_.folder() / "window.rin";
+  std::ifstream in(file, std::ios::binary);
+  check(in.good(), "{}: cannot be read", file.string());
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  const auto bytes = std::as_bytes(std::span(text));
+  return {bytes.begin(), bytes.end()};
+}
+
+Motion Windows::restore(std::span<const std::byte> state, double time, long windows) {
+  const fs::path file = ccx_.folder() / "window.rin";
+  write_text(file, {reinterpret_cast<const char *>(state.data()), state.size()});
+  Motion motion = read_restart_file(file);
+  check(std::abs(motion.time - time) <= 1e-9 * time,
+        "calculix: the restart file is of t = {:.9g} s, ccx's state in it of {:.9g} s", time,
+        motion.time);
+  time_ = end_time_ = motion.time;
+  accepted_ = windows;
+  return motion;
 }
 
 void Windows::write_input(std::span<const NodalForce> forces, double dt) const {

@@ -15,6 +15,10 @@
 #include "bridge/calculix/ccx.hpp"
 #include "bridge/calculix/restart_file.hpp"
 
+#include <cstddef>
+#include <span>
+#include <vector>
+
 namespace sluice::calculix {
 
 class Windows {
@@ -30,6 +34,12 @@ public:
   Motion solve(std::span<const NodalForce> forces, double dt);
   /// The state of the last solve is where the next window starts.
   void accept();
+
+  /// The accepted state as ccx wrote it, after the first window; and back again before the first,
+  /// which is the one after `windows` others then, at `time` [s]. Throws UserError for a state that
+  /// is damaged or of another time.
+  std::vector<std::byte> saved() const;
+  Motion restore(std::span<const std::byte> state, double time, long windows);
 
   const CcxCost &cost() const { return ccx_.cost(); }
 

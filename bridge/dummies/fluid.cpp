@@ -1,9 +1,10 @@
 // SPDX-License-Identifier: MIT
 // A complete fluid solver in C++: water that moves with its wall as one mass, F = -m_a (v_1 -
-// v_0)/dt. Usage: dummy_fluid CASE.toml OUT_DIR
+// v_0)/dt. Usage: dummy_fluid CASE.toml --out DIR, or --check, as `sluice run` calls it
 #include "bridge/participant.hpp"
 
 #include <cstdio>
+#include <string_view>
 #include <vector>
 
 namespace {
@@ -31,11 +32,14 @@ void run(sluice::bridge::Participant &bridge) {
 
 int main(int argc, char **argv) {
   try {
-    sluice::check(argc == 3, "usage: dummy_fluid CASE.toml OUT_DIR");
-    sluice::bridge::Participant bridge("fluid", sluice::Config::load(argv[1]), argv[2]);
+    if (argc == 3 && argv[2] == std::string_view("--check"))
+      return 0;
+    sluice::check(argc == 4 && argv[2] == std::string_view("--out"),
+                  "usage: CASE.toml --out DIR, or CASE.toml --check");
+    sluice::bridge::Participant bridge("fluid", sluice::Config::load(argv[1]), argv[3]);
     run_coupled(bridge, [&] { run(bridge); });
   } catch (const std::exception &error) {
-    std::fprintf(stderr, "%s\n", error.what());
+    std::fprintf(stderr, "dummy_fluid: %s\n", error.what());
     return 1;
   }
 }

@@ -63,13 +63,12 @@ void LogRelay::open_channel() {
     cfmakeraw(&raw); // no translation of line ends
     winsize size{};
     check(openpty(&read_end_, &write_end_, nullptr, &raw, &size) == 0,
-          "sluice: no pseudo-terminal for the progress bar ({})", std::strerror(errno));
+          "no pseudo-terminal for the progress bar ({})", std::strerror(errno));
     fcntl(read_end_, F_SETFD, FD_CLOEXEC);
     fcntl(write_end_, F_SETFD, FD_CLOEXEC);
   } else {
     std::array<int, 2> ends{};
-    check(pipe2(ends.data(), O_CLOEXEC) == 0, "sluice: no pipe for a log ({})",
-          std::strerror(errno));
+    check(pipe2(ends.data(), O_CLOEXEC) == 0, "no pipe for a log ({})", std::strerror(errno));
     read_end_ = ends[0];
     write_end_ = ends[1];
   }

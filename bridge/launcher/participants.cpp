@@ -25,7 +25,7 @@ struct Role {
 constexpr std::array roles{Role{"fluid", "sluice-fluid"}, Role{"solid", "sluice-solid"}};
 
 // Where the build puts programs, relative to its root.
-constexpr std::array build_folders{"fluid", "solid-dealii", "bridge/calculix"};
+constexpr std::array build_folders{"fluid", "solid-dealii", "bridge/calculix", "bridge"};
 
 struct ProgramChoice {
   std::string program;
@@ -68,7 +68,7 @@ bool fluid_has_partner(const Config &config) {
 fs::path own_folder() {
   std::error_code error;
   const fs::path self = fs::read_symlink("/proc/self/exe", error);
-  check(!error, "sluice: cannot tell where this program lies (/proc/self/exe: {}); give --programs",
+  check(!error, "cannot tell where this program lies (/proc/self/exe: {}); give --programs",
         error.message());
   return self.parent_path();
 }

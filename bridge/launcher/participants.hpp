@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: MIT
 // Which programs a case needs. The tables of the case file decide: [fluid] starts sluice-fluid,
 // [solid] starts sluice-solid where the fluid has a wall that it moves; the key `program` in a
-// table names another one, such as "sluice-calculix".
+// table names another one, such as "sluice-calculix". Every program is called twice:
+//
+//   PROGRAM CASE.toml [--set TABLE.KEY=VALUE]... --check       read all, compute nothing, write
+//   nothing PROGRAM CASE.toml [--set ...]... [--restart FILE] --out DIR
 #pragma once
 
 #include "bridge/base/config.hpp"

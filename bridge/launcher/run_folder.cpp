@@ -31,7 +31,7 @@ bool belongs_to_a_run(const std::string &file) {
       R"((fluid|wall|solid)_\d+\.(vtp|vtu))"
       R"(|(fluid|wall|solid)\.(log|pvd|pvd\.part)|summary\.(json|md)|(fluid|solid)_summary\.json)"
       R"(|(tip|fluid|coupling|balance|solid_energy|solid_loads|fluid_loads)\.csv)"
-      R"(|restart_(fluid|solid)_\d+\.h5|probe_[\w-]+\.csv|(tip|levels|strip|energy|profiles|streamlines)\.png|case\.toml)");
+      R"(|restart_(fluid|solid)_\d+\.h5(\.part)?|probe_[\w-]+\.csv|(tip|levels|strip|energy|profiles|streamlines)\.png|case\.toml)");
   return std::regex_match(file, names);
 }
 

@@ -126,7 +126,7 @@ class TemporaryFolder {
 public:
   TemporaryFolder() {
     std::string pattern = (fs::temp_directory_path() / "sluice-XXXXXX").string();
-    check(mkdtemp(pattern.data()) != nullptr, "sluice: cannot make a temporary folder {}", pattern);
+    check(mkdtemp(pattern.data()) != nullptr, "cannot make a temporary folder {}", pattern);
     path_ = pattern;
   }
   ~TemporaryFolder() {
@@ -177,7 +177,7 @@ std::map<std::string, fs::path> restart_files_of(const std::vector<Participant> 
                                                  const Options &options, const fs::path &folder) {
   if (options.restart.empty())
     return {};
-  check(participants.size() > 1, "sluice: --restart is for coupled runs; the fluid alone goes on "
+  check(participants.size() > 1, "--restart is for coupled runs; the fluid alone goes on "
                                  "from fluid.start_state");
   check(!fs::exists(folder) || !fs::exists(options.restart) ||
             !fs::equivalent(folder, options.restart),
@@ -206,9 +206,9 @@ int run(const Options &options) {
   std::vector<Command> commands;
   for (const Participant &participant : participants) {
     auto arguments = arguments_of(options);
-    arguments.insert(arguments.end(), {"--out", folder.string()});
     if (const auto file = restart_files.find(participant.name); file != restart_files.end())
       arguments.insert(arguments.end(), {"--restart", file->second.string()});
+    arguments.insert(arguments.end(), {"--out", folder.string()});
     commands.push_back({participant.name, participant.program, std::move(arguments),
                         folder / (participant.name + ".log"),
                         commands.empty() ? Shown::yes : Shown::no});

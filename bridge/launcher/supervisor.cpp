@@ -46,7 +46,7 @@ public:
       sigaddset(&set, s);
     sigprocmask(SIG_BLOCK, &set, &before_);
     fd_ = signalfd(-1, &set, SFD_CLOEXEC | SFD_NONBLOCK);
-    check(fd_ >= 0, "sluice: cannot wait for signals ({})", std::strerror(errno));
+    check(fd_ >= 0, "cannot wait for signals ({})", std::strerror(errno));
   }
   ~SignalQueue() {
     ::close(fd_);
@@ -167,7 +167,7 @@ private:
       record(**child, status, usage);
       running_.erase(child);
     }
-    check(pid == 0 || running_.empty(), "sluice: its participants are gone, nobody knows how ({})",
+    check(pid == 0 || running_.empty(), "its participants are gone, nobody knows how ({})",
           std::strerror(errno));
   }
 
@@ -190,8 +190,12 @@ private:
     outcome_.participants.push_back(std::move(outcome));
   }
 
+  // Whoever ends a job may tell this process, its group and its session one after the other: a
+  // SIGTERM after the first says nothing new. A second Ctrl-C is a user's who will not wait.
   void stop_by_signal(int signal) {
     const bool is_repeated = outcome_.signal != 0;
+    if (is_repeated && signal == SIGTERM)
+      return;
     outcome_.signal = signal;
     stop_all(is_repeated ? SIGKILL : signal);
     if (signal == SIGTERM) // they may end their window and write what a restart needs

@@ -32,9 +32,9 @@ class CalculixGateTest(unittest.TestCase):
         self.addCleanup(temporary.cleanup)
         self.folder = Path(temporary.name)
 
-    def run_gate(self, settings, name="out", case=CASE):
+    def run_gate(self, settings, name="out", case=CASE, arguments=()):
         out = self.folder / name
-        command = [SLUICE, "run", str(case), "--out", str(out), *overrides(settings)]
+        command = [SLUICE, "run", str(case), "--out", str(out), *overrides(settings), *arguments]
         done = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST_RUN_S)
         return done, out
 
@@ -80,6 +80,27 @@ class CalculixGateTest(unittest.TestCase):
             self.assertLess(summary[f"{quantity}_balance_max"], BALANCE)
         self.assertIn("ccx", summary["phases_ms"]["solid"])
         self.assertEqual(len(list(out.glob("solid_*.vtu"))), 1 + windows // 20, "every 0.01 s")
+
+    def log(self, out):
+        return (out / "coupling.csv").read_text().splitlines()[1:]
+
+    def test_cut_in_two_at_three_instants_it_leaves_the_same_bits(self):
+        """The fastest point may move 0.02 spacings per window, too little in all but halves: a
+        window is tried whole at 0, 1, 2 ms and cut."""
+        settings = COARSE + CCX + ["fluid.courant=0.02", "bridge.max_halvings=2",
+                                   "bridge.restart_every_windows=1", "case.output_interval_s=0"]
+        end = ["case.end_time_s=0.003"]
+        whole = self.completed(settings + end, name="whole")
+        rows = [row.split(",") for row in self.log(whole)]
+        cuts = [row[2] for row, after in zip(rows, rows[1:])
+                if row[0] == after[0] and after[1] == "1"]
+        self.assertEqual(cuts, ["0.0005", "0.0015", "0.0025"], "ends of the windows that were cut")
+        for instant in ("0.001", "0.0015", "0.002"):
+            half = self.completed(settings + [f"case.end_time_s={instant}"], name=f"half{instant}")
+            rest = self.completed(settings + end, name=f"rest{instant}",
+                                  arguments=["--restart", str(half)])
+            self.assertEqual(self.log(half) + self.log(rest), self.log(whole), instant)
+            self.assertEqual(self.tip(rest)[-1], self.tip(whole)[-1])
 
     def own_model(self, *changes):
         """The box as a user's own file: printed, then edited."""

@@ -127,6 +127,19 @@ class FluidAloneTest(GateTest):
         self.assertEqual(len(rows[rest]), 1 + 20)
         self.assertEqual(rows[rest][1:], rows[at_once][21:])
 
+    def test_the_state_lies_beside_the_case_and_is_all_the_water_there_is(self):
+        _, half = self.alone("half", "case.end_time_s=0.002")
+        case = self.folder / "dry.toml"
+        text = CASE.read_text().replace("water_m", 'start_state = "half/fluid_state.h5"\n# water_m')
+        case.write_text(text)
+        out = self.folder / "rest"
+        done = subprocess.run([FLUID, str(case), "--out", str(out), *overrides(COARSE),
+                               *overrides(["fluid.coupled_walls=stay"])], cwd="/",
+                              capture_output=True, text=True, timeout=LONGEST_RUN_S)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        points = [json.loads((run / "fluid_summary.json").read_text())["points"] for run in (half, out)]
+        self.assertEqual(*points)
+
     def test_a_state_of_another_spacing_is_refused_with_both(self):
         _, half = self.alone("half", "case.end_time_s=0.002")
         done, _ = self.alone("rest", f"fluid.start_state={half}/fluid_state.h5",
@@ -140,6 +153,18 @@ class FluidAloneTest(GateTest):
         done, _ = self.run_gate(f"fluid.start_state={half}/fluid_state.h5", "case.output_interval_s=0")
         self.assertNotIn(done.returncode, (0, 3))
         self.assertIn("fluid.start_state is for the fluid alone", done.stderr)
+
+
+class FailedStepTest(GateTest):
+    def test_points_that_fly_apart_cost_a_window_and_not_the_run(self):
+        done, out = self.run_gate('fluid.start_velocity_m_s=["0", "1e10 * x"]',
+                                  "bridge.max_halvings=2", "case.output_interval_s=0")
+        self.assertEqual(done.returncode, 1)
+        for part in ("could not be computed by the fluid", "the points spread over",
+                     "it was halved 2 times already"):
+            self.assertIn(part, done.stderr)
+        self.assertEqual(self.column(out, "coupling.csv", "time_s"), [5e-4, 2.5e-4, 1.25e-4])
+        self.assertEqual(json.loads((out / "summary.json").read_text())["halved_windows"], 2)
 
 
 class RestartTest(GateTest):
@@ -180,6 +205,9 @@ class RestartTest(GateTest):
                                   arguments=["--restart", str(half)])
             self.assertEqual(self.log(half) + self.log(rest), self.log(whole), name)
 
+    def children(self, number):
+        return map(int, Path(f"/proc/{number}/task/{number}/children").read_text().split())
+
     def test_told_to_stop_it_writes_its_state_and_goes_on_from_there(self):
         whole = self.whole(0.016)
         out = self.folder / "stopped"
@@ -190,7 +218,8 @@ class RestartTest(GateTest):
         while not (out / "coupling.csv").exists() or len(self.log(out)) < 30:
             self.assertIsNone(program.poll())
             time.sleep(0.005)
-        program.send_signal(signal.SIGTERM)
+        for number in (program.pid, *self.children(program.pid), program.pid):  # twice, as batch
+            os.kill(number, signal.SIGTERM)                                     # systems may do
         message = program.communicate(timeout=LONGEST_RUN_S)[1]
         self.assertEqual(program.returncode, 128 + signal.SIGTERM)
         self.assertIn("--restart", message)

@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: MIT
+#include "bridge/state_archive.hpp"
 #include "bridge/window_clock.hpp"
 #include "piston.hpp"
 
@@ -32,6 +33,71 @@ TEST(WindowClock, the_last_window_is_what_is_left) {
   ASSERT_EQ(lengths.size(), 4u);
   EXPECT_EQ(lengths[2], 0.3);
   EXPECT_NEAR(lengths[3], 0.1, 1e-15);
+}
+
+/// `clock` as a restart file keeps it, in a run with another end.
+WindowClock saved_and_restored(WindowClock clock, const CaseSettings &settings, int halvings) {
+  StateWriter writer;
+  writer(clock);
+  WindowClock restored(settings, halvings);
+  const auto bytes = writer.bytes();
+  StateReader reader(bytes);
+  reader(restored);
+  return restored;
+}
+
+// At the end of the cut window, and in the middle of it where it was halved.
+TEST(WindowClock, a_later_end_goes_on_from_where_a_cut_window_has_ended) {
+  for (const bool is_halved : {false, true}) {
+    WindowClock clock(times(1.1, 0.5), 2);
+    clock.next_window();
+    clock.next_window();
+    if (is_halved)
+      clock.halve();
+    clock.next_window();
+    const double reached = is_halved ? 1.05 : 1.1;
+    EXPECT_NEAR(clock.time(), reached, 1e-15);
+    clock = saved_and_restored(clock, times(3.0, 0.5), 2);
+    EXPECT_NEAR(clock.time(), reached, 1e-15);
+    EXPECT_EQ(clock.window(), 4);
+    for (double time = reached; !clock.is_over(); clock.next_window()) {
+      EXPECT_NEAR(clock.time(), time, 1e-14);
+      EXPECT_GT(clock.window_length(), 0);
+      time += clock.window_length();
+    }
+    EXPECT_EQ(clock.time(), 3.0);
+  }
+}
+
+TEST(WindowClock, starts_where_a_run_has_ended_whose_last_window_was_cut_or_was_not) {
+  for (const double start : {1.0, 1.1}) {
+    WindowClock clock(times(3.0, 0.5));
+    clock.start_at(start);
+    EXPECT_EQ(clock.time(), start);
+    EXPECT_EQ(clock.window_length(), 0.5);
+    while (!clock.is_over())
+      clock.next_window();
+    EXPECT_EQ(clock.time(), 3.0);
+  }
+}
+
+// Nothing was cut, or the end is the same: not a bit of the clock may change.
+TEST(WindowClock, a_clock_that_is_restored_ticks_on_as_if_it_had_not_been) {
+  for (const double end : {1.5, 1.1}) {
+    WindowClock clock(times(end, 0.1), 3), whole(times(1.1, 0.1), 3);
+    for (WindowClock *one : {&clock, &whole}) {
+      for (int k = 0; k < 4; ++k)
+        one->next_window();
+      one->halve();
+      one->next_window();
+    }
+    clock = saved_and_restored(clock, times(1.1, 0.1), 3);
+    for (; !whole.is_over(); whole.next_window(), clock.next_window()) {
+      EXPECT_EQ(clock.start(), whole.start());
+      EXPECT_EQ(clock.window_length(), whole.window_length());
+    }
+    EXPECT_TRUE(clock.is_over());
+  }
 }
 
 TEST(CaseSettings, a_number_of_windows_that_cannot_be_counted_is_refused_with_the_numbers) {

@@ -12,6 +12,7 @@ import unittest
 from pathlib import Path
 
 BUILD, SOURCES = Path(os.environ["SLUICE_BRIDGE_BUILD"]), Path(os.environ["SLUICE_DUMMIES"])
+LIBRARY = os.environ | {"SLUICE_LIBRARY": str(BUILD / "libsluice.so")}
 WINDOWS, STEP = 50, 1e-3
 CASE = f"""
 [case]
@@ -32,11 +33,10 @@ class Dummies(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             case = Path(folder) / "case.toml"
             case.write_text(CASE)
-            fluid = subprocess.Popen([BUILD / "dummy_fluid", case, folder])
+            fluid = subprocess.Popen([BUILD / "dummy_fluid", case, "--out", folder])
             try:
-                answer = subprocess.run([str(part) for part in solid[:-1]] + [str(case), folder]
-                                        + [str(part) for part in solid[-1]],
-                                        capture_output=True, text=True, timeout=60)
+                answer = subprocess.run([*map(str, solid), str(case), "--out", folder],
+                                        capture_output=True, text=True, timeout=60, env=LIBRARY)
                 self.assertEqual(answer.returncode, 0, answer.stderr)
                 self.assertEqual(fluid.wait(20), 0)
             finally:
@@ -46,22 +46,53 @@ class Dummies(unittest.TestCase):
         self.assertAlmostEqual(float(answer.stdout), EXACT, delta=0.01 * WINDOWS * 1e-8)
 
     def test_c(self):
-        self.follow_the_closed_form(BUILD / "dummy_solid_c", [])
+        self.follow_the_closed_form(BUILD / "dummy_solid_c")
 
     def test_fortran(self):
         program = BUILD / "dummy_solid_fortran"
         if not program.exists():
             self.fail("cases/setup installs gfortran, and the build skipped its dummy")
-        self.follow_the_closed_form(program, [])
+        self.follow_the_closed_form(program)
 
     def test_python(self):
-        self.follow_the_closed_form(sys.executable, SOURCES / "solid.py", [BUILD / "libsluice.so"])
+        self.follow_the_closed_form(sys.executable, SOURCES / "solid.py")
 
-    def test_a_case_file_that_is_missing_is_named(self):
-        answer = subprocess.run([BUILD / "dummy_solid_c", "no-such.toml", "."],
-                                capture_output=True, text=True)
-        self.assertEqual(answer.returncode, 1)
-        self.assertIn("no-such.toml", answer.stderr)
+    def every_one(self):
+        yield from ([BUILD / name] for name in ("dummy_fluid", "dummy_solid_c", "dummy_solid_fortran"))
+        yield [sys.executable, SOURCES / "solid.py"]
+
+    def test_a_case_file_that_is_missing_is_named_in_one_line(self):
+        for program in self.every_one():
+            answer = subprocess.run([*program, "no-such.toml", "--out", "."], capture_output=True,
+                                    text=True, env=LIBRARY)
+            self.assertEqual(answer.returncode, 1, program)
+            self.assertRegex(answer.stderr, r"\A[\w.]+: no-such\.toml: .*\n\Z")
+            self.assertEqual(answer.stdout, "")
+
+    def test_they_are_called_as_the_launcher_calls_and_leave_nothing_when_asked_to_check(self):
+        with tempfile.TemporaryDirectory() as folder:
+            for program in self.every_one():
+                for arguments, status in ((["c.toml", "--check"], 0), (["c.toml"], 1), ([], 1),
+                                          (["c.toml", "--set", "case.end_time_s=1", "--out", "x"], 1)):
+                    answer = subprocess.run([*program, *arguments], capture_output=True, text=True,
+                                            cwd=folder, env=LIBRARY)
+                    self.assertEqual(answer.returncode, status, (program, arguments))
+                    self.assertEqual("usage" in answer.stderr, status == 1)
+                    self.assertNotIn("Traceback", answer.stderr)
+            self.assertEqual(list(Path(folder).iterdir()), [])
+
+    def test_the_launcher_checks_and_runs_them(self):
+        sluice, case = BUILD / "launcher/sluice", SOURCES / "piston.toml"
+        with tempfile.TemporaryDirectory() as folder:
+            subprocess.run([sluice, "check", case], check=True, cwd=folder, stdout=subprocess.DEVNULL)
+            self.assertEqual(list(Path(folder).iterdir()), [])
+            subprocess.run([sluice, "run", case], check=True, cwd=folder, stdout=subprocess.DEVNULL)
+            said = (Path(folder) / "out/piston/solid.log").read_text()
+        self.assertAlmostEqual(float(said), EXACT, delta=0.01 * WINDOWS * 1e-8)
+
+    def test_each_is_under_60_lines(self):
+        for name in ("fluid.cpp", "solid.c", "solid.f90", "solid.py"):
+            self.assertLess(len((SOURCES / name).read_text().splitlines()), 60, name)
 
 
 class PartnersEnd(unittest.TestCase):
@@ -71,7 +102,7 @@ class PartnersEnd(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             case = Path(folder) / "case.toml"
             case.write_text(CASE.replace(str(WINDOWS * STEP), "1e6") + "silence_deadline_s = 1\n")
-            programs = {name: subprocess.Popen([BUILD / program, case, folder], text=True,
+            programs = {name: subprocess.Popen([BUILD / program, case, "--out", folder], text=True,
                                                stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
                         for name, program in (("fluid", "dummy_fluid"), ("solid", "dummy_solid_c"))}
             try:
@@ -106,7 +137,7 @@ class PartnersEnd(unittest.TestCase):
             cases = [Path(folder) / name for name in ("a.toml", "b.toml")]
             cases[0].write_text(CASE)
             cases[1].write_text(CASE.replace("_tolerance = 1e-8", "_tolerance = 0.125", 1))
-            programs = [subprocess.Popen([BUILD / program, case, folder], text=True,
+            programs = [subprocess.Popen([BUILD / program, case, "--out", folder], text=True,
                                          stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
                         for program, case in zip(("dummy_fluid", "dummy_solid_c"), cases)]
             for program in programs:

@@ -20,6 +20,7 @@ transport = "TRANSPORT"
 displacement_tolerance = 1e-10
 force_tolerance = 1e-10
 connect_deadline_s = 20
+restart_every_windows = 3
 """
 ROOT = {"OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
         "OMPI_MCA_btl_vader_single_copy_mechanism": "none"}
@@ -30,10 +31,12 @@ EXACT = [0.01 * math.cos(n * 2 * math.atan(HALF)) for n in range(1, WINDOWS + 1)
 
 
 class TwoPrograms(unittest.TestCase):
-    def run_both(self, n_fluid, n_solid, **environment):
+    def run_both(self, n_fluid, n_solid, windows=WINDOWS, out=None, **environment):
         with tempfile.TemporaryDirectory() as folder:
             case = Path(folder) / "case.toml"
-            case.write_text(CASE.replace("TRANSPORT", "mpi"))
+            case.write_text(CASE.replace("TRANSPORT", "mpi")
+                            .replace(str(WINDOWS * STEP), str(windows * STEP)))
+            folder = out or folder
             return subprocess.run(
                 MPIRUN + ["-n", str(n_fluid), PROGRAM, "fluid", case, folder, ":",
                           "-n", str(n_solid), PROGRAM, "solid", case, folder],
@@ -53,6 +56,30 @@ class TwoPrograms(unittest.TestCase):
         # The tolerance of a window adds up over the windows.
         for d, exact in zip(one, EXACT):
             self.assertAlmostEqual(d, exact, delta=0.01 * WINDOWS * 1e-10)
+
+    def test_ranks_that_go_on_from_a_restart_give_the_same_bits(self):
+        """Once from the end of a shorter run, once from where one rank alone was told to stop."""
+        whole = self.history(self.run_both(3, 2))
+        for windows, stop in ((3, {}), (WINDOWS, {"STOPPED_RANK": "solid:1"})):
+            with tempfile.TemporaryDirectory() as left:
+                half = self.history(self.run_both(3, 2, windows, left, **stop))
+                rest = self.history(self.run_both(3, 2, FROM=left))
+            self.assertEqual(len(half), 3)
+            self.assertEqual(half + rest, whole)
+
+    def test_a_message_later_than_its_deadline_goes_to_memory_of_its_own(self):
+        answer = self.run_both(1, 1, STALL="1")
+        self.assertEqual(answer.returncode, 0, answer.stderr)
+        self.assertEqual(answer.stdout, f"{8 << 20} bytes\n")
+
+    def test_a_program_with_too_few_threads_is_named_by_both(self):
+        for low in ("fluid", "solid"):
+            answer = self.run_both(2, 1, LOW_LEVEL=low)
+            self.assertNotEqual(answer.returncode, 0)
+            for program in ("fluid", "solid"):
+                said = [line for line in answer.stderr.splitlines()
+                        if line.startswith(f"[{program}]") and f"of the {low}, has level 1" in line]
+                self.assertTrue(said, answer.stderr)
 
     def test_a_rank_that_fails_ends_all_with_its_message(self):
         for rank in ("fluid:1", "solid:1", "solid:0"):

@@ -23,6 +23,7 @@ struct Piston {
   double start = 0.01;       // [m]
   double time_step = 1e-3;   // [s]
   int windows = 100;
+  double end_time = 0; // [s]; 0: that of all windows
   double connect_deadline = 5; // [s]
   double silence_deadline = 5; // [s]
   std::string bridge_keys;     // lines of the table [bridge]
@@ -30,7 +31,7 @@ struct Piston {
   std::string case_text() const {
     return fmt::format("[case]\nname = \"piston\"\nend_time_s = {:.17g}\ntime_step_s = {}\n"
                        "[bridge]\nconnect_deadline_s = {}\nsilence_deadline_s = {}\n{}\n",
-                       windows * time_step, time_step, connect_deadline, silence_deadline,
+                       end_time > 0 ? end_time : windows * time_step, time_step, connect_deadline, silence_deadline,
                        bridge_keys);
   }
   Config config() const { return Config::parse(case_text(), "piston.toml"); }

@@ -166,6 +166,21 @@ TEST(Restart, of_a_run_that_ended_goes_on_to_a_later_end) {
   EXPECT_EQ(log, whole.log);
 }
 
+// The first run's last window is 0.4 of a window long.
+TEST(Restart, of_a_run_whose_last_window_was_cut_goes_on_from_its_end) {
+  Piston cut = piston_of(10, "");
+  cut.end_time = 9.4 * cut.time_step;
+  const PistonRun first = run_piston(cut);
+  const PistonRun rest = run_piston(piston_of(20, ""), &first.last);
+  EXPECT_EQ(rest.solid_error + rest.fluid_error, "");
+  const auto time_of = [](const std::string &row) { // after window and iteration
+    return std::stod(row.substr(row.find(',', row.find(',') + 1) + 1));
+  };
+  EXPECT_NEAR(time_of(first.log.back()), 9.4e-3, 1e-15);
+  EXPECT_NEAR(time_of(rest.log.front()), 10.4e-3, 1e-15);
+  EXPECT_NEAR(time_of(rest.log.back()), 20e-3, 1e-15);
+}
+
 TEST(Restart, is_refused_with_another_coupling_or_another_side) {
   const PistonRun half = run_piston(piston_of(4, ""));
   const auto refusal = [&](const Piston &piston, const Saved &from) {
@@ -194,6 +209,15 @@ TEST(Restart, from_different_windows_is_refused_by_both_sides) {
                    {"restart files of different windows", "after window 5", "after window 4"});
 }
 
+// The same case, the same window, other runs: what one of them computed fits the other no more.
+TEST(Restart, from_the_same_window_of_two_runs_is_refused_by_both_sides) {
+  Saved mixed = run_piston(piston_of(4, "")).last;
+  mixed.fluid = run_piston(piston_of(4, "")).last.fluid;
+  const PistonRun run = run_piston(piston_of(8, ""), &mixed);
+  for (const auto &error : {run.fluid_error, run.solid_error})
+    expect_message(error, {"different windows or runs", "after window 4 of run "});
+}
+
 TEST(RestartFiles, the_last_window_that_all_have_is_taken_and_two_are_kept) {
   const TemporaryFolder folder;
   const std::vector<std::string> names{"fluid", "solid"};
@@ -209,6 +233,25 @@ TEST(RestartFiles, the_last_window_that_all_have_is_taken_and_two_are_kept) {
   const auto files = last_restart_files(folder.path(), names);
   EXPECT_EQ(files.at("fluid"), folder.path() / "restart_fluid_000010.h5");
   EXPECT_EQ(files.at("solid"), folder.path() / "restart_solid_000010.h5");
+}
+
+// Files of an earlier run, of later windows, would outlive those of the run at hand.
+TEST(RestartFiles, of_an_earlier_run_are_removed_and_never_taken_for_this_ones) {
+  const TemporaryFolder folder;
+  for (const long window : {100, 200})
+    for (const char *name : {"fluid", "solid"})
+      std::ofstream(restart_file(folder.path(), name, window)) << "x";
+  expect_message(error_of([&] {
+                   check_is_elsewhere(restart_file(folder.path(), "fluid", 200), folder.path());
+                 }),
+                 {"cannot go on in the folder", "--out"});
+  remove_restart_files(folder.path(), "fluid");
+  std::ofstream(restart_file(folder.path(), "fluid", 10)) << "x";
+  remove_older_restart_files(folder.path(), "fluid");
+  EXPECT_TRUE(std::filesystem::exists(restart_file(folder.path(), "fluid", 10)));
+  const std::vector<std::string> names{"fluid", "solid"};
+  expect_message(error_of([&] { last_restart_files(folder.path(), names); }),
+                 {"fluid: 10, solid: 100 200"});
 }
 
 } // namespace

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import paths  # noqa: F401  (puts the modules under test on the path)
 import verdict
+from run_folder import RunError
 from verdict import Verdict, at_most, between
 
 
@@ -57,6 +58,14 @@ class ValidateTest(unittest.TestCase):
         self.assertEqual(status, 1)
         self.assertIn("INCOMPLETE: ended at 2.5 s", said)
 
+    def test_a_run_too_short_to_be_judged_has_a_page_that_says_why(self):
+        def too_short(run):
+            raise RunError("the front ends at 1.03 widths")
+        status, said, page, _ = self.run_with(too_short, completed=True)
+        self.assertEqual(status, 1)
+        for text in (said, page):
+            self.assertIn("INCOMPLETE: the front ends at 1.03 widths", text)
+
     def test_a_run_that_is_judged_by_nothing_does_not_claim_to_be_inside(self):
         _, said, _, _ = self.run_with(lambda run: Verdict(), completed=True)
         self.assertIn("nothing is judged", said)
@@ -66,7 +75,7 @@ class ValidateTest(unittest.TestCase):
             run.series("fluid.csv")
         status, said, _, _ = self.run_with(judge, completed=True)
         self.assertEqual(status, 1)
-        self.assertRegex(said, r"validate: .*fluid\.csv: is not there")
+        self.assertRegex(said, r"INCOMPLETE: .*fluid\.csv: is not there")
 
 
 if __name__ == "__main__":

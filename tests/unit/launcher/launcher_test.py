@@ -317,6 +317,21 @@ class FailedRunTest(LauncherTest):
         for part in ("fluid", "solid"):
             self.assertTrue(self.ends(int((self.out / f"{part}_started").read_text())))
 
+    def test_a_second_request_to_stop_does_not_cost_what_the_first_one_was_for(self):
+        for part in ("fluid", "solid"):
+            self.program(part, f"trap 'asked=1' TERM; touch $out/{part}_started\n"
+                         "until [ $asked ]; do sleep 0.05; done\n"
+                         f"for k in $(seq 10); do sleep 0.05; done; touch $out/{part}_state; exit 1\n")
+        running = subprocess.Popen(self.command("run", "--out", str(self.out)),
+                                   stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        self.wait_for("fluid_started", "solid_started")
+        for _ in range(3):
+            running.send_signal(signal.SIGTERM)
+            time.sleep(0.1)
+        self.assertEqual(running.wait(timeout=20), 128 + signal.SIGTERM)
+        for part in ("fluid", "solid"):
+            self.assertTrue((self.out / f"{part}_state").exists())
+
     def test_participants_do_not_outlive_a_killed_launcher(self):
         self.program("fluid", "echo $$ > $out/number; mv $out/number $out/started; exec sleep 60\n")
         running = subprocess.Popen(self.command("run", "--out", str(self.out)),

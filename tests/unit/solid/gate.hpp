@@ -2,7 +2,10 @@
 // The elastic gate of the case folder, without its water: what several tests start from.
 #pragma once
 
+#include "bridge/participant.hpp"
 #include "solid-dealii/solid_solver.hpp"
+
+#include <fstream>
 
 namespace sluice::solid {
 
@@ -36,6 +39,21 @@ double tip(const SolidSolver<dim> &solver, const SolidState &state, int componen
   for (const int node : nodes)
     sum += state.displacement[dim * node + component];
   return sum / static_cast<double>(nodes.size());
+}
+
+/// The bridge's part of the fluid's state, which a scripted fluid keeps beside the solid's restart
+/// files, and goes on from where the folder `from` has one.
+inline void keep_fluid(const bridge::Participant &bridge, const std::filesystem::path &folder) {
+  const auto bytes = bridge.saved_state();
+  std::ofstream(folder / "fluid.state", std::ios::binary)
+      .write(reinterpret_cast<const char *>(bytes.data()), std::ssize(bytes));
+}
+inline void restore_fluid(bridge::Participant &bridge, const std::filesystem::path &from) {
+  if (from.empty())
+    return;
+  std::ifstream in(from / "fluid.state", std::ios::binary);
+  const std::string text{std::istreambuf_iterator<char>(in), {}};
+  bridge.restore(std::as_bytes(std::span(text)));
 }
 
 } // namespace sluice::solid
