@@ -52,19 +52,65 @@ void AggregateFinder::find(const UnitDiagonalView &matrix, const std::vector<Cel
   });
 }
 
-int AggregateFinder::aggregate_in(CellKey key) const {
+int AggregateFinder::aggregate_in(const Cell &cell) const {
+  if (is_box_)
+    for (int d = 0; d < 3; ++d)
+      if (cell[d] < low_[d] || cell[d] >= low_[d] + extent_[d])
+        return -1;
+  return table_[slot_of(cell)];
+}
+
+// In a box the cell must be one of it; else the place of the cell, or a free one.
+std::size_t AggregateFinder::slot_of(const Cell &cell) const {
+  if (is_box_)
+    return (static_cast<std::size_t>(cell[2] - low_[2]) * extent_[1] + (cell[1] - low_[1])) *
+               extent_[0] +
+           (cell[0] - low_[0]);
+  const CellKey key = key_of(cell);
   const std::size_t mask = table_.size() - 1;
   std::size_t slot = hash(key) & mask;
   while (table_[slot] >= 0 && key_[table_[slot]] != key)
     slot = (slot + 1) & mask;
-  return table_[slot];
+  return slot;
+}
+
+void AggregateFinder::make_table(const std::vector<Cell> &cells) {
+  const int n = static_cast<int>(cells.size());
+  std::array<Cell, Blocks::max_count> low, high;
+  for_each_block(
+      n,
+      [&](IndexRange range, int b) {
+        low[b] = high[b] = cells[range.begin];
+        for (int i = range.begin; i < range.end; ++i)
+          for (int d = 0; d < 3; ++d) {
+            low[b][d] = std::min(low[b][d], cells[i][d]);
+            high[b][d] = std::max(high[b][d], cells[i][d]);
+          }
+      },
+      Work::light);
+  double size = n > 0 ? 1 : 0;
+  for (int d = 0; d < 3 && n > 0; ++d) {
+    low_[d] = low[0][d];
+    int top = high[0][d];
+    for (int b = 1; b < Blocks(n).count(); ++b) {
+      low_[d] = std::min(low_[d], low[b][d]);
+      top = std::max(top, high[b][d]);
+    }
+    size *= static_cast<double>(top) - low_[d] + 1;
+    extent_[d] = static_cast<int>(std::min<std::int64_t>(std::int64_t{top} - low_[d] + 1, 1 << 30));
+  }
+  constexpr double roomy = 8; // cells of the box per row; a full one has a quarter
+  is_box_ = n > 0 && size <= roomy * n;
+  table_.assign(is_box_ ? static_cast<std::size_t>(size)
+                        : std::bit_ceil(static_cast<std::size_t>(n) + 1),
+                -1);
 }
 
 // Consecutive rows are mostly in one cell, which saves look-ups.
 void AggregateFinder::number_cells(const UnitDiagonalView &matrix, const std::vector<Cell> &cells,
                                    Aggregates &result) {
   const int n = matrix.rows();
-  table_.assign(std::bit_ceil(static_cast<std::size_t>(n) + 1), -1);
+  make_table(cells);
   key_.clear();
   result.cell.clear();
   cell_of_.resize(n);
@@ -79,17 +125,13 @@ void AggregateFinder::number_cells(const UnitDiagonalView &matrix, const std::ve
 }
 
 int AggregateFinder::number_of(const Cell &cell, Aggregates &result) {
-  const CellKey key = key_of(cell);
-  const std::size_t mask = table_.size() - 1;
-  std::size_t slot = hash(key) & mask;
-  while (table_[slot] >= 0 && key_[table_[slot]] != key)
-    slot = (slot + 1) & mask;
-  if (table_[slot] < 0) {
-    table_[slot] = result.count();
-    key_.push_back(key);
+  int &number = table_[slot_of(cell)];
+  if (number < 0) {
+    number = result.count();
+    key_.push_back(key_of(cell));
     result.cell.push_back(cell);
   }
-  return table_[slot];
+  return number;
 }
 
 // Counting sort. member_start holds ends first, then walks down to the beginnings.

@@ -14,8 +14,12 @@ namespace sluice::fluid {
 /// Integer coordinates of a grid cell; directions that are not used are zero.
 using Cell = std::array<std::int32_t, 3>;
 
-/// Cell coordinates packed into one number, 21 bits each: differences of keys are keys of
-/// differences. Cells beyond a million from the origin are taken for that far.
+inline Cell moved(const Cell &cell, const Cell &step) {
+  return {cell[0] + step[0], cell[1] + step[1], cell[2] + step[2]};
+}
+
+/// Cell coordinates packed into one number, 21 bits each. Cells beyond a million from the origin
+/// are taken for that far.
 using CellKey = std::int64_t;
 
 constexpr CellKey key_of(const Cell &cell) {
@@ -82,11 +86,13 @@ class AggregateFinder {
 public:
   void find(const UnitDiagonalView &matrix, const std::vector<Cell> &cells, Aggregates &result);
   /// The aggregate in the cell, or -1.
-  int aggregate_in(CellKey key) const;
+  int aggregate_in(const Cell &cell) const;
 
 private:
   void number_cells(const UnitDiagonalView &matrix, const std::vector<Cell> &cells,
                     Aggregates &result);
+  void make_table(const std::vector<Cell> &cells);
+  std::size_t slot_of(const Cell &cell) const;
   int number_of(const Cell &cell, Aggregates &result);
   void list_members(const std::vector<int> &of_row, Aggregates &result);
   void keep_largest_part(const UnitDiagonalView &matrix, int cell, Aggregates &result);
@@ -94,7 +100,12 @@ private:
   int root(int i);
   void attach_rest(const UnitDiagonalView &matrix, Aggregates &result);
 
-  std::vector<int> table_;   // open addressing: cell number or -1; length a power of two
+  // Numbers of the cells, or -1: one place for each cell of the box that holds all where that is
+  // not much larger than the number of rows, else open addressing in a length that is a power of
+  // two.
+  std::vector<int> table_;
+  bool is_box_ = false;
+  Cell low_{}, extent_{};    // of the box
   std::vector<CellKey> key_; // [cells]
   std::vector<int> cell_of_; // [rows] cell number or -1
   std::vector<int> root_;    // [rows] a connected row of the same cell; the first row to itself

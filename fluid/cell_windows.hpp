@@ -43,15 +43,15 @@ template <int dim> struct CellWindows {
   /// that cell in a window of A P.
   static int offset(int shift) { return offset_of_shift[shift]; }
 
-  /// Key of the step from the middle cell to the cell `shift`.
-  static constexpr CellKey key_of_shift(int shift) {
-    return key_of({shift % 3 - 1, shift / 3 % 3 - 1, dim == 3 ? shift / 9 - 1 : 0});
+  /// The step from the middle cell to the cell `shift`.
+  static constexpr Cell step_of_shift(int shift) {
+    return {shift % 3 - 1, shift / 3 % 3 - 1, dim == 3 ? shift / 9 - 1 : 0};
   }
 
-  /// Key of the step from the middle of a window of R A P to a place that is used.
-  static CellKey key_of_coarse_place(int place) {
+  /// The step from the middle of a window of R A P to a place that is used.
+  static Cell step_of_coarse_place(int place) {
     const int in_plane = place % coarse_plane;
-    return key_of({in_plane % 7 - 3, in_plane / 7 - 3, place / coarse_plane - coarse_planes / 2});
+    return {in_plane % 7 - 3, in_plane / 7 - 3, place / coarse_plane - coarse_planes / 2};
   }
 
   /// Adds the window of A P of the cell `shift` to a window of R A P.

@@ -137,7 +137,7 @@ public:
   }
 
 private:
-  double limit_of(int i) const {
+  double limit_of() const {
     return cloud_.has_air ? open_ratio * cloud_.spacing : std::numeric_limits<double>::infinity();
   }
 
@@ -153,8 +153,9 @@ private:
   /// Cuts one cell; true when it is closed and its neighbours are remembered.
   bool cut(int i) const {
     const VoronoiCell<dim> cell = cell_of(i);
-    if (cell.reach() <= limit_of(i)) {
-      set_closed(i, cell.volume(), cell.centroid());
+    if (cell.reach() <= limit_of()) {
+      const auto [volume, offset] = cell.measures();
+      set_closed(i, volume, offset);
       return is_emerging(cell) ? set_emerging(i, cell) : remember(i, cell);
     }
     points_.at_surface[i] = SurfaceMemory::open;
@@ -167,8 +168,9 @@ private:
     cloud_.surface_depth[i] = is_thin ? 0 : depth_of(layer, normal);
     const VoronoiCell<dim> inside =
         is_thin ? layer : cut_at(layer, normal, cloud_.surface_depth[i]);
-    cloud_.centroid_offset[i] = inside.centroid();
-    cloud_.cell_volume[i] = inside.volume();
+    const auto [volume, centroid] = inside.measures();
+    cloud_.centroid_offset[i] = centroid;
+    cloud_.cell_volume[i] = volume;
     return false;
   }
 
@@ -245,21 +247,45 @@ private:
     return known.count >= 3;
   }
 
+  // In space most cells are enclosed, and the corners of a cube are fewer than those of the body
+  // that stands for a ball: that is needed only where one of its faces would be left.
   VoronoiCell<dim> cell_of(int i) const {
-    VoronoiCell<dim> cell = free_;
+    VoronoiCell<dim> cell = start();
+    cut_out(i, cell);
+    if (dim == 3 && cell.reach() > std::min(limit_of(), horizon * cloud_.spacing)) {
+      cell = free_;
+      cut_out(i, cell);
+    }
+    return cell;
+  }
+  VoronoiCell<dim> start() const {
+    if constexpr (dim == 3)
+      return VoronoiCell<3>(horizon * cloud_.spacing);
+    else
+      return free_;
+  }
+
+  // The nearest neighbours first: they leave little to cut for the others.
+  void cut_out(int i, VoronoiCell<dim> &cell) const {
     const Vec<dim> &x = points_.position[i];
-    const double near2 = std::pow(1.3 * cloud_.spacing, 2);
     const auto neighbours = cloud_.neighbours.of(i);
-    for (const int j : neighbours)
-      if (const Vec<dim> r = points_.position[j] - x; r.squaredNorm() < near2)
-        cut_towards(cell, r, j);
+    std::array<double, most_neighbours<dim>> distance2; // in spacings
+    const double scale = 1 / (cloud_.spacing * cloud_.spacing);
+    for (std::size_t k = 0; k < neighbours.size(); ++k)
+      distance2[k] = scale * (points_.position[neighbours[k]] - x).squaredNorm();
+    const auto cut_between = [&](double nearest, double farthest) {
+      for (std::size_t k = 0; k < neighbours.size(); ++k)
+        if (distance2[k] >= nearest * nearest && distance2[k] < farthest * farthest)
+          cut_towards(cell, Vec<dim>(points_.position[neighbours[k]] - x), neighbours[k]);
+    };
+    constexpr double near = dim == 2 ? 1.3 : 1.55, nearest = dim == 2 ? 0 : 1.1;
+    if constexpr (dim == 3)
+      cut_between(0, nearest);
+    cut_between(nearest, near);
     if (const PointWalls<dim> *walls = cloud_.walls_of(i))
       for (const Projection<dim> &p : *walls)
         cell.cut(p.normal, std::max(p.distance, 1e-3 * cloud_.spacing));
-    for (const int j : neighbours)
-      if (const Vec<dim> r = points_.position[j] - x; r.squaredNorm() >= near2)
-        cut_towards(cell, r, j);
-    return cell;
+    cut_between(near, 2 * cell.reach() / cloud_.spacing);
   }
 
   // The part of a cell within `apothem` [m] of its point.

@@ -5,9 +5,26 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdlib>
+#include <filesystem>
 #include <fmt/format.h>
+#include <unistd.h>
 
 namespace {
+
+// While a partner computes, threads that wait must sleep: OpenMP's spin for milliseconds and take
+// the partner's cores, unless the environment says otherwise when the program is loaded. So it is
+// set as the launcher does, and the program begins anew.
+void wait_without_spinning(const sluice::Config &config, char **arguments) {
+  if (!config.has_table("bridge") || std::getenv("OMP_WAIT_POLICY") != nullptr ||
+      std::getenv("GOMP_SPINCOUNT") != nullptr)
+    return;
+  setenv("OMP_WAIT_POLICY", "passive", 0);
+  setenv("GOMP_SPINCOUNT", "3000", 0);
+  std::error_code error;
+  const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+  if (!error)
+    execv(program.c_str(), arguments); // comes back only where it fails; then threads spin
+}
 
 struct Options {
   std::string case_file, out = "out", restart;
@@ -16,9 +33,10 @@ struct Options {
   bool check_only = false;
 };
 
-void run(const Options &options) {
+void run(const Options &options, char **arguments) {
   using namespace sluice;
   const Config config = Config::load(options.case_file, options.overrides);
+  wait_without_spinning(config, arguments);
   config.allow_tables({"case", "parameters", "bridge", "fluid", "fluid.rheology", "fluid.wall",
                        "fluid.gauge", "fluid.probe", "solid", "solid.boundary", "solid.probe"});
   if (options.threads > 0)
@@ -45,7 +63,7 @@ int main(int argc, char **argv) {
   app.add_flag("--check", options.check_only, "read everything, build the scene, stop");
   CLI11_PARSE(app, argc, argv);
   try {
-    run(options);
+    run(options, argv);
   } catch (const std::exception &error) {
     fmt::print(stderr, "sluice-fluid: {}\n", error.what());
     return 1;

@@ -60,6 +60,7 @@ template <int dim> struct FluidParams {
   double gradient_guard = 20;
   double noise_damping = 1;
   bool remember_cells = true;
+  double negligible_viscosity = 1e-5;
   MotionParams motion;
   Rheology rheology; // from table [fluid.rheology] and `viscosity`
 
@@ -143,6 +144,10 @@ template <int dim> struct FluidParams {
         .at_least(0);
     read("remember_cells", remember_cells,
          "false: all Voronoi cells are cut anew in every step, with the same result");
+    read("negligible_viscosity", negligible_viscosity,
+         "time step times kinematic viscosity over spacing^2 below which viscosity is left out")
+        .at_least(0)
+        .at_most(1e-3);
     read("regularity", motion.regularity, "shift towards the cell's centroid per unit of strain")
         .at_least(0);
     read("agitation", motion.agitation, "disturbance of the points per unit of strain, in spacings")

@@ -112,9 +112,10 @@ private:
     transfer_.source.resize(static_cast<std::size_t>(aggregates_.count()) * width);
     transfer_.neighbour.resize(static_cast<std::size_t>(aggregates_.count()) * width);
     for_each_index(aggregates_.count(), [&](int a) {
-      const CellKey key = key_of(aggregates_.cell[a]);
       for (int s = 0; s < width; ++s) {
-        const int next = s < shifts ? finder_.aggregate_in(key + Base::key_of_shift(s)) : -1;
+        const int next =
+            s < shifts ? finder_.aggregate_in(moved(aggregates_.cell[a], Base::step_of_shift(s)))
+                       : -1;
         transfer_.neighbour[a * width + s] = next;
         transfer_.source[a * width + s] = next < 0 ? -1 : next * width + shifts - 1 - s;
       }
@@ -243,7 +244,7 @@ private:
   float keep_large(int a, const CoarseWindow &window, Block &block) const {
     const float threshold =
         params_.drop_tolerance * std::abs(Base::at(window, Base::coarse_centre));
-    const CellKey key = key_of(aggregates_.cell[a]);
+    const Cell &cell = aggregates_.cell[a];
     Floats small{};
     float homeless = 0; // moved there by an entry that reached too far
     for (int part = 0; part < Base::coarse_size / lanes; ++part) {
@@ -251,7 +252,7 @@ private:
       small += (v > threshold) | (v < -threshold) ? Floats{} : v;
       for (unsigned bits = larger_lanes(v, threshold); bits != 0; bits &= bits - 1) {
         const int w = part * lanes + std::countr_zero(bits);
-        const int column = finder_.aggregate_in(key + Base::key_of_coarse_place(w));
+        const int column = finder_.aggregate_in(moved(cell, Base::step_of_coarse_place(w)));
         if (column < 0)
           homeless += Base::at(window, w);
         else if (column != a) {

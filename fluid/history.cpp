@@ -112,6 +112,8 @@ void History<dim>::update_extremes(const FluidSolver<dim> &solver, const Integra
   cells_ += solver.state.points.size();
   cells_cut_ += solver.report().cells_cut;
   viscous_passes_ += solver.report().viscous_passes;
+  near_walls_ += static_cast<long>(solver.cloud().wall_points.size());
+  viscosity_skipped_ += solver.report().viscosity_skipped;
   viscous_iterations_ += solver.report().viscous_iterations;
   ++steps_;
 }
@@ -217,6 +219,9 @@ void History<dim>::write_summary(const FluidSolver<dim> &solver, const std::stri
       static_cast<double>(pressure_iterations_) / std::max(1L, pressure_solves_);
   summary["cells_known_share"] =
       1 - static_cast<double>(cells_cut_) / static_cast<double>(std::max(1L, cells_));
+  summary["points_away_from_walls_share"] =
+      1 - static_cast<double>(near_walls_) / static_cast<double>(std::max(1L, cells_));
+  summary["viscosity_skipped_steps"] = viscosity_skipped_;
   summary["viscous_passes_per_step"] = static_cast<double>(viscous_passes_) / n;
   summary["viscous_iterations_per_step"] = static_cast<double>(viscous_iterations_) / n;
   const ViscousRowCounts &rows = solver.report().viscous_rows;

@@ -41,6 +41,17 @@ inline void store_bytes(const Ints &v, std::int8_t *x) {
   const auto bytes = __builtin_convertvector(v, Bytes);
   std::memcpy(x, &bytes, sizeof bytes);
 }
+/// The lanes as 16-bit integers, cut off beyond.
+inline void store_shorts(const Ints &v, std::int16_t *x) {
+  using Shorts = std::int16_t __attribute__((vector_size(32)));
+  const auto shorts = __builtin_convertvector(v, Shorts);
+  std::memcpy(x, &shorts, sizeof shorts);
+}
+inline Ints load(const int *x) {
+  Ints v;
+  std::memcpy(&v, x, sizeof v);
+  return v;
+}
 inline void store(const Floats &v, float *x) { std::memcpy(x, &v, sizeof v); }
 
 /// lane l: sum over k < width of value[16 k + l] * x[column[16 k + l]].
@@ -76,6 +87,27 @@ inline Ints gathered(const int *index, const int *x) {
   for (int l = 0; l < 16; ++l)
     v[l] = x[index[l]];
   return v;
+#endif
+}
+
+/// lane l: sum over k < width of value[16 k + l] * x[column[16 k + l]].
+inline Floats near_sums(const std::int16_t *value, const std::int16_t *column, int width,
+                        const float *x) {
+#ifdef __AVX512F__
+  const auto load_shorts = [](const std::int16_t *v) {
+    return _mm512_cvtepi16_epi32(_mm256_loadu_si256(reinterpret_cast<const __m256i *>(v)));
+  };
+  __m512 total = _mm512_setzero_ps();
+  for (int k = 0; k < width; ++k, value += 16, column += 16)
+    total = _mm512_fmadd_ps(_mm512_cvtepi32_ps(load_shorts(value)),
+                            _mm512_i32gather_ps(load_shorts(column), x, 4), total);
+  return (Floats)total;
+#else
+  Floats total{};
+  for (int k = 0; k < width; ++k, value += 16, column += 16)
+    for (int l = 0; l < 16; ++l)
+      total[l] += static_cast<float>(value[l]) * x[column[l]];
+  return total;
 #endif
 }
 

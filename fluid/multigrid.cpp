@@ -73,6 +73,7 @@ void Multigrid::start_level(int level) {
   });
   for (auto *vector : {&l.b, &l.x, &l.r})
     vector->resize(l.rows);
+  l.is_compact = l.compact.build(matrix);
 }
 
 void Multigrid::coarsen(int level) {
@@ -173,32 +174,34 @@ void Multigrid::solve_coarsest(std::span<float> x) const {
   }
 }
 
-// The residual of x is the next level's right-hand side, whose rows are divided by their diagonal.
-void Multigrid::restrict_residual(int level) {
-  Level &l = level_[level];
-  const auto matrix = view(level);
-  for_each_block(
-      l.rows,
-      [&](IndexRange range, int) {
-        for_each_product<float>(matrix.pattern, matrix.off_diagonal.data(), l.x.data(), range,
-                                [&](int i, float product) { l.r[i] = l.b[i] - l.x[i] - product; });
-      },
-      Work::light);
-  l.coarser.transfer.restrict(l.r, l.coarser.scale, level_[level + 1].b);
-}
-
-void Multigrid::smooth(int level, std::span<float> x) const {
+// body(i, (A x)_i)
+template <class Body>
+void Multigrid::for_each_product(int level, const std::vector<float> &x, Body &&body) const {
   const Level &l = level_[level];
   const auto matrix = view(level);
   for_each_block(
       l.rows,
       [&](IndexRange range, int) {
-        for_each_product<float>(matrix.pattern, matrix.off_diagonal.data(), l.x.data(), range,
-                                [&](int i, float product) {
-                                  x[i] = l.x[i] + l.weight[i] * (l.b[i] - l.x[i] - product);
-                                });
+        if (l.is_compact)
+          l.compact.for_each_product(matrix.pattern, x.data(), range, body);
+        else
+          fluid::for_each_product<float>(matrix.pattern, matrix.off_diagonal.data(), x.data(),
+                                         range, [&](int i, float rest) { body(i, x[i] + rest); });
       },
       Work::light);
+}
+
+// The residual of x is the next level's right-hand side, whose rows are divided by their diagonal.
+void Multigrid::restrict_residual(int level) {
+  Level &l = level_[level];
+  for_each_product(level, l.x, [&](int i, float product) { l.r[i] = l.b[i] - product; });
+  l.coarser.transfer.restrict(l.r, l.coarser.scale, level_[level + 1].b);
+}
+
+void Multigrid::smooth(int level, std::span<float> x) const {
+  const Level &l = level_[level];
+  for_each_product(level, l.x,
+                   [&](int i, float product) { x[i] = l.x[i] + l.weight[i] * (l.b[i] - product); });
 }
 
 } // namespace sluice::fluid

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "fluid/bicgstab.hpp"
+#include "fluid/compact_matrix.hpp"
 #include "fluid/galerkin.hpp"
 
 namespace sluice::fluid {
@@ -57,6 +58,8 @@ private:
     std::vector<float> off_diagonal_sum; // [rows] of magnitudes
     std::vector<float> weight;           // [rows] of the Jacobi step, 1 for isolated rows
     std::vector<float> b, x, r;
+    CompactMatrix compact;
+    bool is_compact = false;
     CoarseLevel coarser;
   };
 
@@ -67,6 +70,8 @@ private:
   void shift_constants(int n);
   void eliminate(int pivot, int n);
   void cycle(int level, std::span<float> x);
+  template <class Body>
+  void for_each_product(int level, const std::vector<float> &x, Body &&body) const;
   void solve_coarsest(std::span<float> x) const;
   void restrict_residual(int level);
   void smooth(int level, std::span<float> x) const;

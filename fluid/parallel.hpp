@@ -23,7 +23,7 @@ struct IndexRange {
 /// indices, so that a block boundary never divides a vector register.
 class Blocks {
 public:
-  static constexpr int max_count = 64, granularity = 16, smallest = 512;
+  static constexpr int max_count = 64, granularity = 16, smallest = 64;
 
   explicit Blocks(int n) : n_(n), length_(std::max(smallest, rounded_up(n / max_count + 1))) {}
   int count() const { return (n_ + length_ - 1) / length_; }

@@ -160,7 +160,7 @@ void surface_row(const Stencil<dim> &s, const Cloud<dim> &cloud, std::span<doubl
 
 template <int dim> void lay_out(const Cloud<dim> &cloud, PressureProblem<dim> &problem) {
   const int n = static_cast<int>(cloud.kind.size());
-  problem.matrix.pattern = cloud.slices;
+  copy_pattern(cloud.slices, problem.matrix.pattern);
   problem.matrix.diagonal.resize(n);
   problem.matrix.off_diagonal.resize(cloud.slices.stored());
   problem.fluid_source.resize(n);

@@ -61,6 +61,13 @@ struct SlicedPattern {
   }
 };
 
+/// The same pattern, copied by all threads.
+inline void copy_pattern(const SlicedPattern &from, SlicedPattern &to) {
+  to.lay_out(from.rows, [&](int i) { return from.width(i); });
+  for_each_index(
+      static_cast<int>(from.stored()), [&](int k) { to.column[k] = from.column[k]; }, Work::light);
+}
+
 /// Products of the rows of slice `s` with x, summed in `Number`.
 template <class Number, class Value, class X>
 Lanes<Number> slice_product(const SlicedPattern &pattern, const Value *value, const X *x, int s) {

@@ -199,10 +199,21 @@ template <int dim> void FluidSolver<dim>::push_by_known_forces() {
   });
 }
 
+// A wave of L spacings would lose (2 pi / L)^2 times this number in the step.
+template <int dim> bool FluidSolver<dim>::viscosity_is_negligible() const {
+  return !params_.rheology.is_inviscid() &&
+         viscous_number(params_.rheology, params_.density, projection_dt_, params_.spacing) <
+             params_.negligible_viscosity;
+}
+
 template <int dim> void FluidSolver<dim>::predict_velocity() {
   Points<dim> &points = state.points;
   extrapolate_velocity();
-  if (!params_.rheology.is_inviscid()) {
+  report_.viscosity_skipped = viscosity_is_negligible();
+  if (report_.viscosity_skipped) // for the shear on walls
+    params_.rheology.with_law(
+        [&](const auto &law) { viscous_.viscosity.assign(points.size(), law(0)); });
+  if (!params_.rheology.is_inviscid() && !report_.viscosity_skipped) {
     push_by_known_forces();
     build_viscous_rows(points, cloud_, params_.rheology, problem_, viscous_.rows);
     const ViscousResult result =

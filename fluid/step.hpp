@@ -24,7 +24,8 @@ template <int dim> struct StepReport {
   RowCounts rows;
   int pressure_iterations = 0; // over all coupling iterations of the step
   int viscous_iterations = 0;
-  int viscous_passes = 0; // over the viscosity law; 0: explicit
+  int viscous_passes = 0;         // over the viscosity law; 0: explicit
+  bool viscosity_skipped = false; // it is negligible
   ViscousRowCounts viscous_rows;
   int pressure_solves = 0;
   Vec<dim> contact_impulse = Vec<dim>::Zero(); // of walls on the points that touched them [N s/m]
@@ -78,6 +79,7 @@ private:
   void freeze_cloud();
   void extrapolate_velocity();
   void push_by_known_forces();
+  bool viscosity_is_negligible() const;
   void predict_velocity();
   void assemble();
 

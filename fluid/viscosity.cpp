@@ -3,6 +3,7 @@
 
 #include "bridge/base/check.hpp"
 #include "fluid/least_squares.hpp"
+#include "fluid/packed_stencil.hpp"
 #include "fluid/parallel.hpp"
 #include "fluid/weights.hpp"
 
@@ -147,6 +148,15 @@ public:
     const int start = problem_.rows.start[i];
     const double mu = problem_.viscosity[i];
     const ViscousRowForm form = problem_.rows.form[i];
+    if (form == ViscousRowForm::pressures) {
+      const SlicedMatrix &matrix = *problem_.rows.pressure_matrix;
+      for (std::size_t k = 0; k < neighbours.size(); ++k) {
+        const double entry = matrix.off_diagonal[matrix.pattern.place(i, static_cast<int>(k))];
+        visit(neighbours[k],
+              Mat<dim>(mu * problem_.rows.pressure_scale * entry * Mat<dim>::Identity()));
+      }
+      return;
+    }
     const bool is_open = cloud_.kind[i] != PointKind::interior;
     const Vec<dim> slope = is_open || is_uniform_ ? Vec<dim>(Vec<dim>::Zero()) : viscosity_slope(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
@@ -191,20 +201,55 @@ private:
   bool is_uniform_;
 };
 
+/// Sum over the neighbours of entries of the pressure's matrix times differences of velocity.
 template <int dim>
-void apply_explicitly(const ViscousForce<dim> &force, double factor, VecSpan<dim> velocity,
-                      std::vector<double> &change) {
-  const int n = static_cast<int>(velocity.size());
-  change.resize(dim * n);
-  for_each_point(n, [&](int i) {
+PackVec<dim> pressures_sums(const PackedStencil<dim> &s, const SlicedMatrix &matrix,
+                            VecView<dim> velocity) {
+  const PackVec<dim> u = gathered(s.self(), velocity.data());
+  const double *entry = &matrix.off_diagonal[matrix.pattern.place(s.first(), 0)];
+  PackVec<dim> total{};
+  for (int k = 0; k < s.width(); ++k, entry += SlicedPattern::lanes) {
+    const PackVec<dim> u_j = gathered(s.neighbours(k), velocity.data());
+    for (int a = 0; a < dim; ++a)
+      total[a] += load(entry) * (u_j[a] - u[a]);
+  }
+  return total;
+}
+
+// Rows of the pressure's matrix eight at a time, the others one by one.
+template <int dim>
+void apply_explicitly(const ViscousForce<dim> &force, const Points<dim> &points,
+                      const Cloud<dim> &cloud, double factor, VecSpan<dim> velocity,
+                      ViscousProblem<dim> &problem) {
+  const ViscousRows<dim> &rows = problem.rows;
+  std::vector<double> &change = problem.source;
+  change.resize(dim * velocity.size());
+  const auto force_on = [&](int i) {
     Vec<dim> total = Vec<dim>::Zero();
     force.for_each_block(
         i, [&](int j, const Mat<dim> &block) { total += block * (velocity[j] - velocity[i]); },
         [&](const Vec<dim> &u, const Mat<dim> &block) { total += block * (u - velocity[i]); });
-    for (int a = 0; a < dim; ++a)
-      change[dim * i + a] = factor * total[a];
+    return total;
+  };
+  for_each_pack(points.size(), [&](int first) {
+    const PackedStencil<dim> s(first, points, cloud);
+    const auto like_pressures = [&](int i) { return rows.form[i] == ViscousRowForm::pressures; };
+    PackVec<dim> sums{};
+    bool any = false;
+    for (int i = first; i < first + s.count(); ++i)
+      any = any || like_pressures(i);
+    if (any)
+      sums = pressures_sums(s, *rows.pressure_matrix, velocity);
+    for (int l = 0; l < s.count(); ++l) {
+      const int i = first + l;
+      const bool is_regular = like_pressures(i);
+      const Vec<dim> other = is_regular ? Vec<dim>(Vec<dim>::Zero()) : force_on(i);
+      const double scale = problem.viscosity[i] * rows.pressure_scale;
+      for (int a = 0; a < dim; ++a)
+        change[dim * i + a] = factor * (is_regular ? scale * sums[a][l] : other[a]);
+    }
   });
-  for_each_point(n, [&](int i) { velocity[i] += Vec<dim>(&change[dim * i]); });
+  for_each_point(points.size(), [&](int i) { velocity[i] += Vec<dim>(&change[dim * i]); });
 }
 
 template <int dim> void lay_out(const Cloud<dim> &cloud, ViscousProblem<dim> &problem) {
@@ -370,12 +415,16 @@ double relative_change(const std::vector<double> &now, const std::vector<double>
 
 } // namespace
 
-bool is_explicit(const Rheology &rheology, double density, double dt, double spacing) {
+double viscous_number(const Rheology &rheology, double density, double dt, double spacing) {
   if (!rheology.is_newtonian())
-    return false;
+    return std::numeric_limits<double>::infinity();
   double viscosity = 0;
   rheology.with_law([&](const auto &law) { viscosity = law(0); });
-  return dt * viscosity / density < explicit_limit * spacing * spacing;
+  return dt * viscosity / density / (spacing * spacing);
+}
+
+bool is_explicit(const Rheology &rheology, double density, double dt, double spacing) {
+  return viscous_number(rheology, density, dt, spacing) < explicit_limit;
 }
 
 template <int dim> double shear_rate(const Mat<dim> &gradient) {
@@ -403,7 +452,7 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
   double stiffness = update_viscosity(expected, 1);
   ViscousResult result;
   if (stiffness < explicit_limit) {
-    apply_explicitly(force, factor, velocity, problem.source);
+    apply_explicitly(force, points, cloud, factor, velocity, problem);
     return result;
   }
   lay_out(cloud, problem);

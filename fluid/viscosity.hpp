@@ -35,6 +35,8 @@ template <int dim> struct ViscousProblem {
   std::vector<double> source, solution, previous; // [m/s], interleaved
 };
 
+/// dt nu / spacing^2 of a Newtonian fluid; infinity for others.
+double viscous_number(const Rheology &rheology, double density, double dt, double spacing);
 /// Whether a Newtonian fluid's viscosity [Pa s] is so low that its step is explicit.
 bool is_explicit(const Rheology &rheology, double density, double dt, double spacing);
 

@@ -54,6 +54,14 @@ std::array<Vec<3>, 2> tangents_of(const Vec<3> &n) {
 
 enum class Kind { quadratic, linear, surface, pairs };
 
+/// Is the pressure's row that of a velocity too?
+template <int dim>
+bool is_like_pressures(int i, const Cloud<dim> &cloud, const PressureProblem<dim> &pressure) {
+  const PointWalls<dim> *walls = cloud.walls_of(i);
+  return cloud.openness[i] == 0 && (!walls || walls->count == 0) &&
+         pressure.row_kind[i] == RowKind::quadratic;
+}
+
 /// Builds the rows of one point, with or without those of the gradient.
 template <int dim, bool with_gradient> class StencilBuilder {
 public:
@@ -62,6 +70,10 @@ public:
       : points_(points), cloud_(cloud), pressure_(pressure), rows_(rows) {}
 
   Kind build(int i) const {
+    if (!with_gradient && is_like_pressures(i, cloud_, pressure_)) {
+      rows_.form[i] = ViscousRowForm::pressures;
+      return Kind::quadratic;
+    }
     const Row row = gather(i);
     rows_.form[i] = ViscousRowForm::blocks;
     if (cloud_.kind[i] == PointKind::surface && surface_row(row))
@@ -73,7 +85,7 @@ public:
     if (slides(row) && slip_row(row))
       return Kind::quadratic;
     rows_.form[i] = ViscousRowForm::scalar;
-    if (!row.walls && pressure_.row_kind[i] == RowKind::quadratic) {
+    if (is_like_pressures(i, cloud_, pressure_)) {
       pressures_row(row);
       return Kind::quadratic;
     }
@@ -136,29 +148,41 @@ private:
     return !p.slips || std::abs(p.normal.dot(e)) > closer_to_normal;
   }
 
+  /// The neighbours in scaled coordinates, and their fit.
+  struct Fitted {
+    std::array<Basis<dim>, most_neighbours<dim>> basis; // times the weight
+    QuadraticFit<dim> fit;
+  };
+  void fit_neighbours(const Row &row, Fitted &fitted) const {
+    for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
+      const Vec<dim> q = scaled(row.i, points_.position[row.neighbours[k]]);
+      const double w = weight_at(q);
+      fitted.basis[k] = w * quadratic_basis(q);
+      fitted.fit.add_neighbour(q, w);
+    }
+  }
+
   /// One quadratic fit for the component along the normal of the first wall that slips, and one for
   /// each along it.
   bool slip_row(const Row &row) const {
     std::fill_n(row.block, row.neighbours.size(), Mat<dim>(Mat<dim>::Zero()));
     for (int m = 0; m < row.walls->count; ++m)
       (*row.wall)[m] = {};
+    Fitted fitted;
+    fit_neighbours(row, fitted);
     const Vec<dim> n = std::find_if(row.walls->begin(), row.walls->end(), is_gliding)->normal;
-    if (!add_component(row, n))
+    if (!add_component(row, fitted, n))
       return false;
     for (const Vec<dim> &t : tangents_of(n))
-      if (!add_component(row, t))
+      if (!add_component(row, fitted, t))
         return false;
     set_linear_gradient(row);
     return true;
   }
 
   // Adds the Laplacian of the component along e to the row's blocks.
-  bool add_component(const Row &row, const Vec<dim> &e) const {
-    QuadraticFit<dim> fit;
-    for (const int j : row.neighbours) {
-      const Vec<dim> q = scaled(row.i, points_.position[j]);
-      fit.add_neighbour(q, weight_at(q));
-    }
+  bool add_component(const Row &row, const Fitted &fitted, const Vec<dim> &e) const {
+    QuadraticFit<dim> fit = fitted.fit;
     const auto for_each_held = [&](auto &&visit) {
       for (int m = 0; m < row.walls->count; ++m)
         if (const Projection<dim> &p = row.walls->projection[m]; holds_along(p, e))
@@ -174,33 +198,27 @@ private:
     const Basis<dim> laplacian = fit.solve(laplacian_functional<dim>(cloud_.radius));
     const Mat<dim> along = outer(e, e);
     double negative = 0, positive = 0;
-    const auto add = [&](Mat<dim> &block, const Vec<dim> &q, double w) {
-      const double value = w * laplacian.dot(quadratic_basis(q));
+    const auto add = [&](Mat<dim> &block, double value) {
       block += value * along;
       (value < 0 ? negative : positive) += std::abs(value);
     };
-    for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
-      const Vec<dim> q = scaled(row.i, points_.position[row.neighbours[k]]);
-      add(row.block[k], q, weight_at(q));
-    }
+    for (std::size_t k = 0; k < row.neighbours.size(); ++k)
+      add(row.block[k], laplacian.dot(fitted.basis[k]));
     for_each_held([&](int m, const Vec<dim> &q) {
-      add((*row.wall)[m].block, q, wall_weight * weight_at(q));
+      add((*row.wall)[m].block, wall_weight * weight_at(q) * laplacian.dot(quadratic_basis(q)));
     });
     return !has_wrong_signs(negative, positive);
   }
 
   void pressures_row(const Row &row) const {
     const SlicedMatrix &matrix = pressure_.matrix;
-    const double scale = -1 / (cloud_.spacing * cloud_.spacing);
     for (std::size_t k = 0; k < row.neighbours.size(); ++k)
-      row.laplacian[k] =
-          scale * matrix.off_diagonal[matrix.pattern.place(row.i, static_cast<int>(k))];
-    if constexpr (with_gradient) {
-      const auto &functional = pressure_.gradient[row.i];
-      for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
-        const Vec<dim> q = scaled(row.i, points_.position[row.neighbours[k]]);
-        row.gradient[k] = weight_at(q) * (functional.transpose() * quadratic_basis(q));
-      }
+      row.laplacian[k] = rows_.pressure_scale *
+                         matrix.off_diagonal[matrix.pattern.place(row.i, static_cast<int>(k))];
+    const auto &functional = pressure_.gradient[row.i];
+    for (std::size_t k = 0; k < row.neighbours.size(); ++k) {
+      const Vec<dim> q = scaled(row.i, points_.position[row.neighbours[k]]);
+      row.gradient[k] = weight_at(q) * (functional.transpose() * quadratic_basis(q));
     }
   }
 
@@ -417,16 +435,24 @@ void build_viscous_rows(const Points<dim> &points, const Cloud<dim> &cloud,
                         const Rheology &rheology, const PressureProblem<dim> &pressure,
                         ViscousRows<dim> &rows) {
   const int n = points.size();
+  const bool newtonian = rheology.is_newtonian();
+  rows.pressure_matrix = &pressure.matrix;
+  rows.pressure_scale = -1 / (cloud.spacing * cloud.spacing);
   rows.start.resize(n + 1);
   rows.start[0] = 0;
   for (int i = 0; i < n; ++i)
-    rows.start[i + 1] = rows.start[i] + cloud.neighbours.count[i];
+    rows.start[i + 1] =
+        rows.start[i] +
+        (newtonian && is_like_pressures(i, cloud, pressure) ? 0 : cloud.neighbours.count[i]);
   rows.form.resize(n);
-  rows.laplacian.resize(rows.start[n]);
-  rows.gradient.resize(rows.start[n]);
-  rows.block.resize(rows.start[n]);
+  const std::size_t entries = rows.start[n];
+  if (rows.laplacian.size() < entries) { // some to spare, as surfaces grow
+    rows.laplacian.resize(entries + entries / 4);
+    rows.gradient.resize(entries + entries / 4);
+    rows.block.resize(entries + entries / 4);
+  }
   rows.wall_weights.assign(cloud.point_walls.size(), {});
-  if (rheology.is_newtonian())
+  if (newtonian)
     build_rows<dim, false>(points, cloud, pressure, rows);
   else
     build_rows<dim, true>(points, cloud, pressure, rows);

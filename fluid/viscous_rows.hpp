@@ -32,8 +32,12 @@ struct ViscousRowCounts {
   int pairs = 0;     // thin, and fallback of the surface: central forces between pairs
 };
 
-/// Whether one number per neighbour serves all components.
-enum class ViscousRowForm : std::uint8_t { scalar, blocks };
+/// Whether one number per neighbour serves all components, and where it stands.
+enum class ViscousRowForm : std::uint8_t {
+  scalar,    // in `laplacian`
+  blocks,    // in `block`: a matrix per neighbour
+  pressures, // in the pressure's matrix: a Newtonian fluid away from walls and surfaces
+};
 
 /// Weights of one wall projection in the rows of its point.
 template <int dim> struct ViscousWallWeight {
@@ -44,19 +48,21 @@ template <int dim> struct ViscousWallWeight {
 };
 
 template <int dim> struct ViscousRows {
-  std::vector<int> start; // of each point's neighbours in the three arrays below
+  std::vector<int> start; // of each point's neighbours in the three arrays below; none: `pressures`
   std::vector<ViscousRowForm> form;
   std::vector<double> laplacian;  // [1/m^2], scalar rows
   std::vector<Vec<dim>> gradient; // [1/m]
   std::vector<Mat<dim>> block;    // [1/m^2], rows of blocks: of the components together
   std::vector<std::array<ViscousWallWeight<dim>, most_projections<dim>>>
       wall_weights; // per wall slot
+  const SlicedMatrix *pressure_matrix = nullptr;
+  double pressure_scale = 0; // from its entries to Laplacians [1/m^2]
   ViscousRowCounts count;
 };
 
 /// Builds the rows; once per step. Away from walls and surfaces they are those of the pressure,
-/// whose operators must be assembled. A Newtonian fluid gets no gradients there: its law does not
-/// look at them.
+/// whose operators must be assembled; a Newtonian fluid, whose law does not look at gradients, gets
+/// none of its own there.
 template <int dim>
 void build_viscous_rows(const Points<dim> &points, const Cloud<dim> &cloud,
                         const Rheology &rheology, const PressureProblem<dim> &pressure,

@@ -12,10 +12,11 @@
 // over them, are ours.
 #pragma once
 
-#include "bridge/base/vec.hpp"
+#include "fluid/packs.hpp"
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 
@@ -23,6 +24,12 @@ namespace sluice::fluid {
 
 /// Convex polygon or polyhedron around the origin, in coordinates relative to the point.
 template <int dim> class VoronoiCell;
+
+/// Volume [m^dim] and centroid [m] of a cell.
+template <int dim> struct CellMeasures {
+  double volume;
+  Vec<dim> centroid;
+};
 
 template <> class VoronoiCell<2> {
 public:
@@ -44,6 +51,7 @@ public:
   double reach() const { return reach_; }
   double volume() const;   ///< [m^2]
   Vec<2> centroid() const; ///< relative to the point [m]
+  CellMeasures<2> measures() const { return {volume(), centroid()}; }
 
 private:
   static constexpr int capacity = 32;
@@ -64,39 +72,43 @@ public:
   void cut(const Vec<3> &normal, double offset);
 
   int size() const { return size_; }
-  const Vec<3> &corner(int k) const { return corner_[k]; }
+  Vec<3> corner(int k) const { return {coordinate_[0][k], coordinate_[1][k], coordinate_[2][k]}; }
   /// Distance of the farthest corner [m].
   double reach() const { return reach_; }
-  double volume() const { return moments().volume; } ///< [m^3]
-  Vec<3> centroid() const;                           ///< relative to the point [m]
+  CellMeasures<3> measures() const;
+  double volume() const { return measures().volume; }     ///< [m^3]
+  Vec<3> centroid() const { return measures().centroid; } ///< relative to the point [m]
 
 private:
   using Face = std::uint8_t;
   using Triple = std::array<Face, 3>;
   static constexpr int most_faces = 64, most_corners = 128;
 
-  struct Moments {
-    double volume = 0;             // [m^3]
-    Vec<3> first = Vec<3>::Zero(); // integral of x [m^4]
-  };
-  Moments moments() const;
-  int unused_face() const;
+  /// Lanes of the corners first .. first + 7 that there are.
+  unsigned present(int first) const {
+    return size_ - first < pack_size ? (1u << (size_ - first)) - 1 : (1u << pack_size) - 1;
+  }
+  Pack coordinates(int d, int first) const { return load(&coordinate_[d][first]); }
+  int unused_face();
   void set_corner(int k, const Vec<3> &x, const Triple &faces);
+  void update_reach();
 
-  std::array<Vec<3>, most_corners> corner_;
+  // Corners side by side, eight of which a plane is held against at a time.
+  alignas(64) std::array<std::array<double, most_corners>, 3> coordinate_{};
   std::array<Triple, most_corners> faces_;
   /// after_[p][q]: the corner at which the outline of face p leaves the edge that it shares with q;
   /// its faces are p, q and the next one along the outline. Holds for edges of the cell.
   std::array<std::array<std::uint8_t, most_faces>, most_faces> after_;
-  int size_ = 0;
+  int size_ = 0, faces_used_ = 6; // numbers below were given to a face
   double reach_ = 0;
 };
 
 /// Cuts along the perpendicular bisector towards the neighbour j at r; skipped when out of reach.
 template <int dim> void cut_towards(VoronoiCell<dim> &cell, const Vec<dim> &r, int j = 0) {
-  const double distance = r.norm();
-  if (!(distance > 1e-12 && distance < 2 * cell.reach()))
+  const double distance2 = r.squaredNorm();
+  if (!(distance2 > 1e-24 && distance2 < 4 * cell.reach() * cell.reach()))
     return;
+  const double distance = std::sqrt(distance2);
   if constexpr (dim == 2)
     cell.cut(r / distance, 0.5 * distance, j);
   else
@@ -180,35 +192,52 @@ inline VoronoiCell<3>::VoronoiCell(double w) : reach_(std::sqrt(3.0) * w) {
 }
 
 inline void VoronoiCell<3>::set_corner(int k, const Vec<3> &x, const Triple &f) {
-  corner_[k] = x;
+  for (int d = 0; d < 3; ++d)
+    coordinate_[d][k] = x[d];
   faces_[k] = f;
   for (int m = 0; m < 3; ++m)
     after_[f[m]][f[(m + 1) % 3]] = static_cast<std::uint8_t>(k);
 }
 
-inline int VoronoiCell<3>::unused_face() const {
+// A number that no face has: a new one, or when these are used up one that was cut off.
+inline int VoronoiCell<3>::unused_face() {
+  if (faces_used_ < most_faces)
+    return faces_used_++;
   std::uint64_t used = 0;
   for (int k = 0; k < size_; ++k)
     for (const Face f : faces_[k])
       used |= std::uint64_t{1} << f;
-  int f = 0;
-  while (f < most_faces && (used >> f & 1) != 0)
-    ++f;
-  return f;
+  return std::countr_one(used);
+}
+
+inline void VoronoiCell<3>::update_reach() {
+  Pack farthest{};
+  for (int first = 0; first < size_; first += pack_size) {
+    Pack r2{};
+    for (int d = 0; d < 3; ++d)
+      r2 += coordinates(d, first) * coordinates(d, first);
+    farthest = r2 > farthest ? r2 : farthest;
+  }
+  double reach2 = 0;
+  for (int lane = 0; lane < pack_size; ++lane)
+    reach2 = std::max(reach2, farthest[lane]);
+  reach_ = std::sqrt(reach2);
 }
 
 inline void VoronoiCell<3>::cut(const Vec<3> &normal, double offset) {
-  std::array<double, most_corners> height;
+  alignas(64) std::array<double, most_corners> height;
   std::array<std::uint8_t, most_corners> outside;
   const double tolerance = 1e-12 * reach_;
   int n_outside = 0;
-  for (int k = 0; k < size_; ++k) {
-    height[k] = normal.dot(corner_[k]) - offset;
-    if (height[k] > tolerance)
-      outside[n_outside++] = static_cast<std::uint8_t>(k);
+  for (int first = 0; first < size_; first += pack_size) {
+    const Pack h = normal[0] * coordinates(0, first) + normal[1] * coordinates(1, first) +
+                   normal[2] * coordinates(2, first) - offset;
+    store(h, &height[first]);
+    for (unsigned lanes = bits_of(h > tolerance) & present(first); lanes != 0; lanes &= lanes - 1)
+      outside[n_outside++] = static_cast<std::uint8_t>(first + std::countr_zero(lanes));
   }
-  const int face = n_outside > 0 ? unused_face() : most_faces;
-  if (face == most_faces || n_outside == size_)
+  const int face = n_outside > 0 && n_outside < size_ ? unused_face() : most_faces;
+  if (face == most_faces)
     return;
   std::array<Vec<3>, most_corners> added;
   std::array<Triple, most_corners> added_faces;
@@ -222,49 +251,49 @@ inline void VoronoiCell<3>::cut(const Vec<3> &normal, double offset) {
       if (height[in] > tolerance)
         continue;
       const double t = std::max(height[out] / (height[out] - height[in]), 0.0);
-      added[n_added] = corner_[out] + std::min(t, 1.0) * (corner_[in] - corner_[out]);
+      added[n_added] = corner(out) + std::min(t, 1.0) * (corner(in) - corner(out));
       added_faces[n_added++] = {p, q, static_cast<Face>(face)};
     }
   }
   if (size_ - n_outside + n_added > most_corners)
     return;
-  // New corners take the places of those that go; what is left over is filled from the end.
+  // New corners take the places of those that go; what is left over is filled from the end, which
+  // leaves the origin there.
   int next = 0;
   for (; next < n_added; ++next)
     set_corner(next < n_outside ? outside[next] : size_++, added[next], added_faces[next]);
   for (int m = n_outside - 1; m >= next; --m) {
     const int last = --size_;
     if (outside[m] != last)
-      set_corner(outside[m], corner_[last], faces_[last]);
+      set_corner(outside[m], corner(last), faces_[last]);
+    for (int d = 0; d < 3; ++d)
+      coordinate_[d][last] = 0;
   }
-  double reach2 = 0;
-  for (int k = 0; k < size_; ++k)
-    reach2 = std::max(reach2, corner_[k].squaredNorm());
-  reach_ = std::sqrt(reach2);
+  update_reach();
 }
 
 // Sum over the faces of the pyramids above them, each cut into tetrahedra around one of its
 // corners.
-inline VoronoiCell<3>::Moments VoronoiCell<3>::moments() const {
-  std::array<const Vec<3> *, most_faces> base{};
+inline CellMeasures<3> VoronoiCell<3>::measures() const {
+  std::array<std::uint8_t, most_faces> base;
   for (int k = 0; k < size_; ++k)
     for (const Face f : faces_[k])
-      base[f] = &corner_[k];
-  Moments sum;
+      base[f] = static_cast<std::uint8_t>(k);
+  double six_volumes = 0;
+  Vec<3> moment = Vec<3>::Zero();
   for (int k = 0; k < size_; ++k)
     for (int e = 0; e < 3; ++e) {
       const Face p = faces_[k][e], r = faces_[k][(e + 2) % 3];
-      const Vec<3> &a = *base[p], &b = corner_[k], &c = corner_[after_[p][r]];
-      const double volume = a.dot(cross(b, c)) / 6;
-      sum.volume += volume;
-      sum.first += 0.25 * volume * (a + b + c);
+      const int from = base[p], next = after_[p][r];
+      if (from == k || from == next)
+        continue;
+      const Vec<3> a = corner(from), b = corner(k), c = corner(next);
+      const double volume = a.dot(cross(b, c));
+      six_volumes += volume;
+      moment += volume * (a + b + c);
     }
-  return sum;
-}
-
-inline Vec<3> VoronoiCell<3>::centroid() const {
-  const Moments sum = moments();
-  return sum.volume > 0 ? Vec<3>(sum.first / sum.volume) : Vec<3>(Vec<3>::Zero());
+  return {six_volumes / 6,
+          six_volumes > 0 ? Vec<3>(0.25 / six_volumes * moment) : Vec<3>(Vec<3>::Zero())};
 }
 
 } // namespace sluice::fluid

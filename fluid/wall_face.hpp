@@ -150,23 +150,36 @@ inline bool is_crossed(const Corners<3> &c, const Vec<3> &from, const Vec<3> &to
 }
 
 /// Calls visit(shape, weight) for the points of a quadrature over pieces no longer than `longest`
-/// [m]; exact for the product of two linear functions on each piece. Two Gauss points on pieces of
-/// equal length.
-template <class Visit>
-void for_each_quadrature_point(const Corners<2> &c, double longest, Visit &&visit) {
+/// [m]; exact for the product of two linear functions on each piece. Left out are parts of the face
+/// for whose corners concerns(corners) is false. Two Gauss points on pieces of equal length.
+template <class Visit, class Concerns>
+void for_each_quadrature_point(const Corners<2> &c, double longest, Visit &&visit,
+                               Concerns &&concerns) {
   const double length = face_measure(c);
   const int pieces = std::max(1, static_cast<int>(std::ceil(length / longest)));
   const double gauss = 0.5 / std::sqrt(3.0);
-  for (int piece = 0; piece < pieces; ++piece)
+  const auto at = [&](double t) { return Vec<2>((1 - t) * c[0] + t * c[1]); };
+  const auto halve = [&](const auto &self, int first, int last) -> void {
+    if (!concerns(Corners<2>{at(double(first) / pieces), at(double(last) / pieces)}))
+      return;
+    if (last - first > 1) {
+      const int middle = (first + last) / 2;
+      self(self, first, middle);
+      self(self, middle, last);
+      return;
+    }
     for (const double offset : {-gauss, gauss}) {
-      const double t = (piece + 0.5 + offset) / pieces;
+      const double t = (first + 0.5 + offset) / pieces;
       visit(Shape<2>{1 - t, t}, 0.5 * length / pieces);
     }
+  };
+  halve(halve, 0, pieces);
 }
 
 /// Three points on triangles that come from halving the longest edge.
-template <class Visit>
-void for_each_quadrature_point(const Corners<3> &c, double longest, Visit &&visit) {
+template <class Visit, class Concerns>
+void for_each_quadrature_point(const Corners<3> &c, double longest, Visit &&visit,
+                               Concerns &&concerns) {
   const auto mean = [](const Shape<3> &a, double w, const Shape<3> &b) {
     Shape<3> m;
     for (int k = 0; k < 3; ++k)
@@ -185,6 +198,8 @@ void for_each_quadrature_point(const Corners<3> &c, double longest, Visit &&visi
       }
     const Shape<3> &a = piece[widest], &b = piece[(widest + 1) % 3], &top = piece[(widest + 2) % 3];
     const Shape<3> middle = mean(a, 0.5, b);
+    if (!concerns(Corners<3>{at(piece[0]), at(piece[1]), at(piece[2])}))
+      return;
     if (length > longest) {
       self(self, {a, middle, top}, 0.5 * area);
       self(self, {middle, b, top}, 0.5 * area);
@@ -195,6 +210,12 @@ void for_each_quadrature_point(const Corners<3> &c, double longest, Visit &&visi
       visit(mean(corner, 0.5, centre), area / 3);
   };
   halve(halve, {Shape<3>{1, 0, 0}, Shape<3>{0, 1, 0}, Shape<3>{0, 0, 1}}, face_measure(c));
+}
+
+/// The same over the whole face.
+template <class FaceCorners, class Visit>
+void for_each_quadrature_point(const FaceCorners &c, double longest, Visit &&visit) {
+  for_each_quadrature_point(c, longest, visit, [](const FaceCorners &) { return true; });
 }
 
 } // namespace sluice::fluid

@@ -32,10 +32,38 @@ public:
     const Corners<dim> corners = walls_.corners(walls_.faces[k]);
     for_each_quadrature_point(
         corners, cloud_.spacing,
-        [&](const Shape<dim> &shape, double measure) { add_sample(k, shape, measure); });
+        [&](const Shape<dim> &shape, double measure) { add_sample(k, shape, measure); },
+        [&](const Corners<dim> &part) { return is_near_points(part); });
   }
 
 private:
+  // False where no cell of the grid near a part of a face holds a point: most of a dry channel goes
+  // in large parts. Where many cells are near nothing is said yet, the part will be halved.
+  bool is_near_points(const Corners<dim> &part) const {
+    const double reach = load_radius * cloud_.spacing;
+    const Grid<dim> &grid = cloud_.grid;
+    Vec<dim> low = part[0], high = part[0];
+    for (const Vec<dim> &x : part) {
+      low = low.cwiseMin(x);
+      high = high.cwiseMax(x);
+    }
+    low.array() -= reach;
+    high.array() += reach;
+    if ((high.array() < grid.origin.array()).any() || (low.array() > grid.top().array()).any())
+      return false;
+    const auto first = grid.place(low), last = grid.place(high);
+    int cells = 1;
+    for (int d = 0; d < dim; ++d)
+      cells *= last[d] - first[d] + 1;
+    constexpr int few = dim == 2 ? 25 : 125;
+    bool any = cells > few;
+    if (!any)
+      grid.for_each_run(first, last, [&](int begin, int end) {
+        any = any || cloud_.ranges.start[begin] < cloud_.ranges.start[end + 1];
+      });
+    return any;
+  }
+
   void add_sample(int k, const Shape<dim> &shape, double measure) {
     const WallFace<dim> &face = walls_.faces[k];
     const Vec<dim> x = value_at<dim>(walls_.position, face, shape);

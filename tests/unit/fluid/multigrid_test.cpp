@@ -170,6 +170,20 @@ TEST(Aggregates, a_cell_cut_by_a_wall_gives_its_smaller_part_to_the_cell_it_is_c
   EXPECT_EQ(aggregates.of_row, (std::vector<int>{0, 0, 0, 1, 1, 2, 2, 2}));
 }
 
+TEST(Aggregates, beyond_the_box_of_all_cells_there_are_none) {
+  ScaledMatrix matrix;
+  matrix.build(chain(4, 2));
+  const std::vector<Cell> cells{{-2, 3, 0}, {-1, 3, 0}, {-2, 4, 0}, {-1, 4, 0}};
+  Aggregates aggregates;
+  AggregateFinder finder;
+  const std::vector<float> off_diagonal_sum(4, 1);
+  finder.find({matrix.pattern(), matrix.off_diagonal_float(), off_diagonal_sum}, cells, aggregates);
+  for (int a = 0; a < 4; ++a)
+    EXPECT_EQ(finder.aggregate_in(cells[a]), a);
+  for (const Cell &outside : {Cell{0, 3, 0}, Cell{-3, 4, 0}, Cell{-1, 5, 0}, Cell{-1, 4, 1}})
+    EXPECT_EQ(finder.aggregate_in(outside), -1);
+}
+
 TEST(Aggregates, negative_cells_and_far_away_ones_are_cells_like_others) {
   ScaledMatrix matrix;
   matrix.build(chain(4, 2));
@@ -179,8 +193,8 @@ TEST(Aggregates, negative_cells_and_far_away_ones_are_cells_like_others) {
   const std::vector<float> off_diagonal_sum(4, 1);
   finder.find({matrix.pattern(), matrix.off_diagonal_float(), off_diagonal_sum}, cells, aggregates);
   EXPECT_EQ(aggregates.of_row, (std::vector<int>{0, 1, 2, 3}));
-  EXPECT_EQ(finder.aggregate_in(key_of({900'000, -5, 0}) + key_of({0, 1, 0})), 3);
-  EXPECT_EQ(finder.aggregate_in(key_of({0, 0, 0})), -1);
+  EXPECT_EQ(finder.aggregate_in(moved({900'000, -5, 0}, {0, 1, 0})), 3);
+  EXPECT_EQ(finder.aggregate_in({0, 0, 0}), -1);
 }
 
 } // namespace

@@ -164,6 +164,32 @@ TEST(Step, CellsThatAreKnownFromTheLastStepAreThoseThatAreCutAnew) {
   RecordProperty("share_cut", fmt::format("{:.3f}", cut / points));
 }
 
+// dt nu / spacing^2 is 5e-4 * 1e-6 / 0.004^2 = 3e-5: with a hundredth of that viscosity is left
+// out.
+TEST(Step, ViscosityThatIsLeftOutWouldHaveChangedTheVelocityByLessThanItsBound) {
+  const std::string thin = "fluid.dynamic_viscosity_pa_s=1e-5";
+  FluidSolver<2> skips(testing::scene_of(testing::dam_break, {thin})),
+      acts(testing::scene_of(testing::dam_break, {thin, "fluid.negligible_viscosity=0"}));
+  constexpr int steps = 20;
+  double change = 0, speed = 0;
+  for (int k = 0; k < steps; ++k) {
+    advance(skips, 5e-4, 1);
+    advance(acts, 5e-4, 1);
+    EXPECT_TRUE(skips.report().viscosity_skipped);
+    EXPECT_FALSE(acts.report().viscosity_skipped);
+  }
+  ASSERT_EQ(skips.state.points.id, acts.state.points.id);
+  for (int i = 0; i < skips.state.points.size(); ++i) {
+    change =
+        std::max(change, (skips.state.points.velocity[i] - acts.state.points.velocity[i]).norm());
+    speed = std::max(speed, skips.state.points.velocity[i].norm());
+  }
+  std::printf("viscosity left out: change %.1e of the speed\n", change / speed);
+  // 8 times the bound a step for the roughest mode, and as much of what grows from it
+  EXPECT_LT(change, 16 * steps * 1e-5 * speed);
+  EXPECT_GT(change, 0);
+}
+
 // Lists may grow while the water spreads; their memory grows in large pieces, so most steps need
 // none. One thread, since the first loop of a new one allocates too.
 TEST(Step, MostStepsAllocateNothingAfterTheFirstOnes) {

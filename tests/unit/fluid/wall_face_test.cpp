@@ -66,6 +66,44 @@ TEST(WallFace, TheQuadratureIsExactForProductsOfShapeFunctionsAndAsFineAsAsked) 
   }
 }
 
+// What is not of concern is left out in large parts; the rest comes in the same order.
+TEST(WallFace, AQuadratureOfPartOfATriangleIsThatOfTheWholeWithoutTheRest) {
+  std::mt19937 engine(5);
+  const Corners<3> c = random_triangle(engine);
+  const Vec<3> centre = (c[0] + c[1] + c[2]) / 3;
+  const double radius = 0.1 * (c[1] - c[0]).norm(), longest = 0.02 * (c[1] - c[0]).norm();
+  const auto is_inside = [&](const Shape<3> &s) {
+    return (interpolated<Vec<3>>(s, c[0], c[1], c[2]) - centre).norm() < radius;
+  };
+  std::vector<Shape<3>> whole, part;
+  int visited = 0, all = 0, asked = 0;
+  for_each_quadrature_point(c, longest, [&](const Shape<3> &s, double) {
+    ++all;
+    if (is_inside(s))
+      whole.push_back(s);
+  });
+  const auto may_reach = [&](const Corners<3> &p) { // the circle around a part meets the ball
+    ++asked;
+    const Vec<3> middle = (p[0] + p[1] + p[2]) / 3;
+    double size = 0;
+    for (const Vec<3> &x : p)
+      size = std::max(size, (x - middle).norm());
+    return (middle - centre).norm() < size + radius;
+  };
+  for_each_quadrature_point(
+      c, longest,
+      [&](const Shape<3> &s, double) {
+        ++visited;
+        if (is_inside(s))
+          part.push_back(s);
+      },
+      may_reach);
+  EXPECT_EQ(part, whole);
+  EXPECT_GT(part.size(), 100u);
+  EXPECT_LT(visited, all / 4);
+  EXPECT_LT(asked, all / 4);
+}
+
 TEST(WallFace, ALineThroughACommonSideCrossesOneOfTheTwoTriangles) {
   std::mt19937 engine(3);
   std::uniform_real_distribution<double> uniform(0, 1);
