@@ -3,14 +3,11 @@
 
 #include "bridge/base/check.hpp"
 #include "bridge/node_tree.hpp"
+#include "bridge/precice/meeting.hpp"
 #include "bridge/side.hpp"
-#include "bridge/transport_socket.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
-#include <sstream>
-#include <thread>
 
 namespace sluice::precice_layer {
 
@@ -20,17 +17,7 @@ using bridge::PayloadWriter;
 
 namespace {
 
-constexpr double connect_deadline = 60;        // [s]
-constexpr double silence_deadline = 20;        // [s]
-constexpr double stranger_patience = 5;        // [s]
-constexpr std::size_t largest_hello = 4096;    // [bytes]
-constexpr std::size_t largest_text = 16 << 20; // [bytes]
 using Table = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-std::string token() {
-  const char *given = std::getenv("SLUICE_TOKEN");
-  return given ? given : "";
-}
 
 bool has(const std::vector<std::string> &names, const std::string &name) {
   return std::find(names.begin(), names.end(), name) != names.end();
@@ -50,18 +37,6 @@ bridge::CaseSettings case_settings(const Configuration &config) {
   settings.end_time = config.end_time;
   settings.time_step = config.window;
   return settings;
-}
-
-bridge::Address address_of(const Configuration &config) {
-  bridge::Address address{bridge::Address::Family::unix_domain, "", "", ""};
-  address.path = (std::filesystem::absolute(config.exchange_directory).lexically_normal() /
-                  fmt::format("precice-{}-{}.sock", config.acceptor, config.connector))
-                     .string();
-  check(address.path.size() <= 107,
-        "precice: the socket's path {} is longer than 107 characters; choose a shorter "
-        "exchange-directory",
-        address.path);
-  return address;
 }
 
 } // namespace
@@ -140,95 +115,6 @@ bool Coupling::requires_initial_data() const {
 
 // ---- meeting ------------------------------------------------------------------------------------
 
-void Coupling::greet(bridge::Link &link, bridge::Deadline deadline, bridge::LastWords last_words) {
-  const auto say_hello = [&] {
-    PayloadWriter payload;
-    payload.text(token()).text(name_);
-    link.send(FrameType::hello, std::move(payload));
-  };
-  link.distrust(deadline, last_words);
-  try {
-    if (name_ == config_.connector)
-      say_hello();
-    link.receive(FrameType::hello, largest_hello, fmt::format("the greeting of {}", partner_),
-                 [&](PayloadReader &read) {
-                   check(read.text() == token(),
-                         "precice: {} showed a wrong token to {}; both need "
-                         "the same SLUICE_TOKEN",
-                         partner_, name_);
-                   const std::string there = read.text();
-                   check(there == partner_, "precice: {} met {} instead of {}", name_, there,
-                         partner_);
-                   return 0;
-                 });
-    if (name_ == config_.acceptor)
-      say_hello();
-  } catch (const UserError &error) {
-    link.send_abort(error.what());
-    throw;
-  }
-  link.trust();
-}
-
-void Coupling::meet() {
-  const bridge::Address address = address_of(config_);
-  const bridge::Deadline deadline = bridge::deadline_in(connect_deadline);
-  const auto link_over = [&](std::unique_ptr<bridge::Transport> transport) {
-    return std::make_unique<bridge::Link>(std::move(transport), name_, partner_, silence_deadline);
-  };
-  if (name_ == config_.acceptor) {
-    bridge::Listener listener(address, token());
-    while (auto transport = listener.accept(deadline)) {
-      auto link = link_over(std::move(transport));
-      try {
-        greet(*link, std::min(deadline, bridge::deadline_in(stranger_patience)),
-              bridge::LastWords::unheard);
-        link_ = std::move(link);
-        break;
-      } catch (const UserError &) { // a stranger: the partner may still come
-      }
-    }
-  } else {
-    while (!link_ && bridge::Clock::now() < deadline) {
-      if (auto transport = bridge::try_connect(address, deadline)) {
-        auto link = link_over(std::move(transport));
-        greet(*link, deadline, bridge::LastWords::heard);
-        link_ = std::move(link);
-      } else {
-        std::this_thread::sleep_for(std::chrono::milliseconds(10));
-      }
-    }
-  }
-  check(link_ != nullptr, "precice: {} waited {} s for {} at {}", name_, connect_deadline, partner_,
-        address.text());
-  link_->start_heartbeat();
-}
-
-void Coupling::compare_texts() {
-  const auto send = [&] {
-    PayloadWriter payload;
-    payload.text(config_.text);
-    link_->send(FrameType::case_text, std::move(payload));
-  };
-  if (is_first_)
-    send();
-  const std::string there =
-      link_->receive(FrameType::case_text, largest_text, "the partner's configuration",
-                     [](PayloadReader &read) { return read.text(); });
-  if (!is_first_)
-    send();
-  std::istringstream own_text(config_.text), other_text(there);
-  std::string own, other;
-  for (int line = 1; there != config_.text; ++line) {
-    const bool has_own = static_cast<bool>(std::getline(own_text, own));
-    const bool has_other = static_cast<bool>(std::getline(other_text, other));
-    check(has_own && has_other && own == other,
-          "precice: the participants read different configurations: line {} is '{}' "
-          "for {} and '{}' for {}",
-          line, own, name_, other, partner_);
-  }
-}
-
 void Coupling::exchange_meshes() {
   if (is_first_)
     send_meshes();
@@ -272,9 +158,9 @@ void Coupling::initialize() {
   check(!link_, "precice: initialize comes once");
   for (const std::string &own : self_.provided)
     bridge::check_mesh(meshes_.at(own), name_);
-  meet();
+  link_ = meet(config_, name_, partner_);
   told([&] {
-    compare_texts();
+    compare_texts(*link_, config_, name_, partner_);
     exchange_meshes();
     for (Way &way : ways_) {
       build_map(way);

@@ -70,9 +70,6 @@ private:
   };
 
   void find_ways();
-  void meet();
-  void greet(bridge::Link &link, bridge::Deadline deadline, bridge::LastWords last_words);
-  void compare_texts();
   void exchange_meshes();
   void send_meshes();
   void receive_meshes();
