@@ -308,7 +308,7 @@ void set_wall_velocity(const Walls<dim> &walls, const Cloud<dim> &cloud,
         continue;
       WallRow<dim> &wall = problem.wall_rows[k][m];
       const double wall_speed = p.normal.dot(wall_velocity(walls, p));
-      wall.datum = factor * (wall.approach - wall_speed);
+      wall.datum = factor * (wall.approach - wall_speed) + wall.carried;
       problem.source[cloud.wall_points[k]] -= wall.laplacian * factor * wall_speed;
     }
   });

@@ -26,6 +26,7 @@ template <int dim> struct WallRow {
   double laplacian = 0; // of the datum g in the point's Laplacian row, times spacing^2 [m]
   Vec<dim> gradient = Vec<dim>::Zero(); // of the datum g in the point's gradient [-]
   double datum = 0;                     // g = n . grad p [Pa/m], with the latest wall velocity
+  double carried = 0;                   // of it, what u* has kept of the last pressure
 };
 
 /// How a row of the Laplacian was made.

@@ -46,7 +46,7 @@ template <int dim> void FluidSolver<dim>::iterate() {
   set_wall_velocity(walls, cloud_, pressure_params_, projection_dt_, problem_);
   const SolveResult result = timer("pressure solve", [&] {
     SolveOptions options;
-    options.relative_tolerance = params_.pressure_tolerance;
+    options.relative_tolerance = params_.pressure_tolerance * std::max(carried_.new_share, 1e-6);
     options.null_space = problem_.has_open_point ? NullSpace::none : NullSpace::constants;
     return bicgstab(scaled_, problem_.source, points.pressure, multigrid_, options, memory_);
   });
@@ -73,6 +73,10 @@ template <int dim> void FluidSolver<dim>::end_step() {
       points.previous_velocity[i] = points.velocity[i];
       points.velocity[i] = predicted_[i] - factor * points.pressure_gradient[i];
     });
+    if (carried_.exists()) {
+      for_each_point(points.size(), [&](int i) { points.velocity[i] -= carried_.velocity[i]; });
+      settle_pressure(cloud_, carried_, points);
+    }
     damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient,
                      params_.noise_damping * pace_.points, dt_, points.velocity);
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
@@ -206,8 +210,20 @@ template <int dim> bool FluidSolver<dim>::viscosity_is_negligible() const {
              params_.negligible_viscosity;
 }
 
+// Gravity and pressure act by the projection, as far as a stiff point does not keep them.
+template <int dim> void FluidSolver<dim>::take_back_push() {
+  const int n = state.points.size();
+  for_each_point(n, [&](int i) { predicted_[i] -= push_[i]; });
+  if (is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
+    return;
+  for_each_point(n, [&](int i) { push_[i] -= projection_dt_ * params_.gravity; });
+  share_pressure(viscosity(), projection_dt_ / params_.density, params_.spacing, push_, carried_);
+  for_each_point(n, [&](int i) { predicted_[i] += carried_.velocity[i]; });
+}
+
 template <int dim> void FluidSolver<dim>::predict_velocity() {
   Points<dim> &points = state.points;
+  carried_.clear();
   extrapolate_velocity();
   report_.viscosity_skipped = viscosity_is_negligible();
   if (report_.viscosity_skipped) // for the shear on walls
@@ -224,7 +240,7 @@ template <int dim> void FluidSolver<dim>::predict_velocity() {
     report_.viscous_iterations = result.iterations;
     report_.viscous_passes = result.passes;
     report_.viscous_rows = viscous_.rows.count;
-    for_each_point(points.size(), [&](int i) { predicted_[i] -= push_[i]; });
+    take_back_push();
   } else {
     points.surface_pressure.assign(points.size(), 0); // it may come from a run with viscosity
   }
@@ -252,6 +268,8 @@ template <int dim> void FluidSolver<dim>::assemble() {
                                 target_divergence_);
     assemble_pressure_source(points, cloud_, pressure_params_, predicted_, target_divergence_,
                              projection_dt_, problem_);
+    if (carried_.exists())
+      add_carried_pressure(points, cloud_, viscosity(), target_divergence_, carried_, problem_);
     if (params_.holds_tension)
       forget_enclosed_surfaces(cloud_, points);
     else if (state.step > 0) // the first step has no pressure to judge by

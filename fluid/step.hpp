@@ -7,6 +7,7 @@
 #include "bridge/base/check.hpp"
 #include "bridge/base/timer.hpp"
 #include "fluid/bicgstab.hpp"
+#include "fluid/carried_pressure.hpp"
 #include "fluid/multigrid.hpp"
 #include "fluid/pressure.hpp"
 #include "fluid/scene.hpp"
@@ -81,6 +82,7 @@ private:
   void push_by_known_forces();
   bool viscosity_is_negligible() const;
   void predict_velocity();
+  void take_back_push();
   void assemble();
 
   FluidParams<dim> params_;
@@ -95,6 +97,7 @@ private:
   std::vector<Vec<dim>> expected_;  // [m/s], at the end of the step, from the steps before
   SurfacePoints surface_;
   std::vector<Vec<dim>> push_; // [m/s]
+  CarriedPressure<dim> carried_;
   std::vector<double> target_divergence_;
   std::vector<double> cell_average_; // memory of the volume control
   std::vector<char> leaves_; // per point
