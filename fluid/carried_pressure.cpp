@@ -64,20 +64,21 @@ template <int dim>
 void correct(const Points<dim> &points, const Cloud<dim> &cloud, std::span<const double> viscosity,
              std::span<const double> target_divergence, const PressureProblem<dim> &problem,
              CarriedPressure<dim> &carried) {
-  const auto at_point = [&](int i) {
-    return carried.share[i] * viscosity[i] *
-           (problem.velocity_gradient[i].trace() - target_divergence[i]);
+  const auto excess = [&](int i) {
+    return problem.velocity_gradient[i].trace() - target_divergence[i];
   };
-  carried.correction.assign(points.size(), 0);
+  const int n = points.size();
+  const double mean = n / sum(n, [&](int i) { return 1 / viscosity[i]; });
+  carried.correction.assign(n, 0);
   for_each_point(points.size(), [&](int i) {
     if (cloud.kind[i] != PointKind::interior)
       return;
-    double total = at_point(i), weights = 1;
+    double total = excess(i), weights = 1;
     for_each_interior_neighbour(i, points, cloud, [&](int j, double w) {
-      total += w * at_point(j);
+      total += w * excess(j);
       weights += w;
     });
-    carried.correction[i] = total / weights;
+    carried.correction[i] = carried.share[i] * std::min(viscosity[i], mean) * total / weights;
   });
 }
 

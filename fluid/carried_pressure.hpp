@@ -11,9 +11,11 @@
 //   L (p - beta p_last) = rho/dt (D u* - theta),       u = u* - dt/rho (grad p - beta grad p_last),
 //
 // and the next step knows p - beta mu (D u* - theta): without this term the pressure of a creeping
-// flow would take s (width / spacing)^2 steps to build up. Source: L. J. P. Timmermans, P. D.
-// Minev, F. N. van de Vosse, Int. J. Numer. Meth. Fluids 22 (1996) 673; J. L. Guermond, J. Shen,
-// Math. Comp. 73 (2004) 1719 (for beta = 1).
+// flow would take s (width / spacing)^2 steps to build up. It is averaged over a point's
+// surroundings, with the point's viscosity or the harmonic mean of all, whichever is less: a plug
+// that slides on a thin layer answers to its pressure by the layer's viscosity. Source: L. J. P.
+// Timmermans, P. D. Minev, F. N. van de Vosse, Int. J. Numer. Meth. Fluids 22 (1996) 673; J. L.
+// Guermond, J. Shen, Math. Comp. 73 (2004) 1719 (for beta = 1).
 #pragma once
 
 #include "fluid/pressure.hpp"
@@ -27,7 +29,7 @@ namespace sluice::fluid {
 template <int dim> struct CarriedPressure {
   std::vector<double> share;      // beta
   std::vector<Vec<dim>> velocity; // [m/s], -beta dt/rho grad p_last: what u* has kept
-  std::vector<double> correction; // [Pa], beta mu (D u* - theta), mean of the point's surroundings
+  std::vector<double> correction; // [Pa], of what the next step knows
   std::vector<double> smoothing;  // [Pa]
   double new_share = 1;           // of the pressure's sources that the step adds, by their size
 

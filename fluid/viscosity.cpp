@@ -192,7 +192,9 @@ private:
       const ViscousWallWeight<dim> &w = problem_.rows.wall_weights[cloud_.wall_slot[i]][m];
       slope += 2 * (w.viscosity - problem_.viscosity[i]) * w.gradient;
     });
-    return slope;
+    // What changes faster the points do not resolve, and the rows would lose their signs.
+    const double steepest = 0.5 * problem_.viscosity[i] / cloud_.spacing, length = slope.norm();
+    return length > steepest ? Vec<dim>(steepest / length * slope) : slope;
   }
 
   const Walls<dim> &walls_;
