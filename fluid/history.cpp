@@ -20,7 +20,8 @@ template <int dim> std::string series_header(const std::vector<GaugeParams<dim>>
       columns += fmt::format(",{}_{}_{}", name, "xyz"[d], unit);
     return columns;
   };
-  std::string header = "time_s,kinetic_j,potential_j,work_on_walls_j,outlet_energy_j";
+  std::string header = "time_s,kinetic_j,potential_j,work_on_walls_j,outlet_energy_j,"
+                       "by_correction_j,by_projection_j,by_damping_j";
   for (const char *name : {"volume", "point_volume", "tank_volume", "tank_point_volume",
                            "outflow_past_tip", "outflow"})
     header += fmt::format(",{}_{}", name, dim == 2 ? "m2" : "m3");
@@ -106,6 +107,10 @@ void History<dim>::update_extremes(const FluidSolver<dim> &solver, const Integra
   energy_gain_max_ = std::max(energy_gain_max_, energy_gain(now));
   volume_drift_max_ = std::max(volume_drift_max_,
                                std::abs(now.tank_volume - now.tank_point_volume) / initial_volume_);
+  const EnergyChanges &changes = solver.report().energy;
+  energy_changes_.correction += changes.correction;
+  energy_changes_.projection += changes.projection;
+  energy_changes_.damping += changes.damping;
   guarded_rows_ += solver.report().rows.linear + solver.report().rows.plain;
   pressure_iterations_ += solver.report().pressure_iterations;
   pressure_solves_ += solver.report().pressure_solves;
@@ -134,6 +139,9 @@ void History<dim>::record(const FluidSolver<dim> &solver, const bridge::Interfac
                           now.potential,
                           work_on_walls_,
                           outlet_energy_,
+                          energy_changes_.correction,
+                          energy_changes_.projection,
+                          energy_changes_.damping,
                           now.volume,
                           now.point_volume,
                           now.tank_volume,
@@ -224,6 +232,11 @@ void History<dim>::write_summary(const FluidSolver<dim> &solver, const std::stri
   summary["viscosity_skipped_steps"] = viscosity_skipped_;
   summary["viscous_passes_per_step"] = static_cast<double>(viscous_passes_) / n;
   summary["viscous_iterations_per_step"] = static_cast<double>(viscous_iterations_) / n;
+  const RowCounts &pressure_rows = solver.report().rows;
+  summary["pressure_rows_last_step"] = {{"quadratic", pressure_rows.quadratic},
+                                        {"linear", pressure_rows.linear},
+                                        {"plain", pressure_rows.plain},
+                                        {"open", pressure_rows.open}};
   const ViscousRowCounts &rows = solver.report().viscous_rows;
   summary["viscous_rows_last_step"] = {{"quadratic", rows.quadratic},
                                        {"linear", rows.linear},

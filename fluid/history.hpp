@@ -52,6 +52,7 @@ private:
 
   // running sums
   double work_on_walls_ = 0, outlet_energy_ = 0, start_outlet_energy_ = 0, last_time_ = 0;
+  EnergyChanges energy_changes_;
   Integrals<dim> start_, last_;
   long viscous_passes_ = 0, viscous_iterations_ = 0, viscosity_skipped_ = 0, near_walls_ = 0;
   long cells_ = 0, cells_cut_ = 0;

@@ -7,6 +7,7 @@
 #include "fluid/surface_stress.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace sluice::fluid {
@@ -28,6 +29,7 @@ template <int dim> void FluidSolver<dim>::begin_step(double dt) {
   dt_ = dt;
   report_ = {};
   pace_ = pace_of(state.points, params_.gravity.norm(), params_.spacing);
+  report_.energy.correction = energy_of_shift();
   timer("move", [&] {
     const bool knows_change = params_.time_order == 2 && state.step_size > 0;
     move_points(state.points, dt, knows_change ? 0.5 * dt / state.step_size : 0);
@@ -79,6 +81,7 @@ template <int dim> void FluidSolver<dim>::end_step() {
     }
     damp_point_noise(points, cloud_, predicted_, problem_.velocity_gradient,
                      params_.noise_damping * pace_.points, dt_, points.velocity);
+    measure_work();
     plan_shift(points, cloud_, params_.motion, problem_.velocity_gradient, dt_);
   });
   ++state.step;
@@ -121,6 +124,41 @@ double FluidSolver<dim>::energy_of_point(const Vec<dim> &u, const Vec<dim> &x) c
   return mass_of_point() * (0.5 * u.squaredNorm() - params_.gravity.dot(x));
 }
 
+template <int dim> double FluidSolver<dim>::energy() const {
+  const Points<dim> &points = state.points;
+  return sum(points.size(),
+             [&](int i) { return energy_of_point(points.velocity[i], points.position[i]); });
+}
+
+template <int dim> double FluidSolver<dim>::energy_of_shift() const {
+  const Points<dim> &points = state.points;
+  return sum(points.size(), [&](int i) {
+    const Vec<dim> &u = points.velocity[i], &x = points.position[i];
+    return energy_of_point(u + points.shift_velocity[i], x + points.shift[i]) -
+           energy_of_point(u, x);
+  });
+}
+
+template <int dim> void FluidSolver<dim>::measure_work() {
+  const Points<dim> &points = state.points;
+  const double factor = projection_dt_ / params_.density;
+  const auto work = block_sums<2>(points.size(), [&](IndexRange range) {
+    std::array<double, 2> part{};
+    for (int i = range.begin; i < range.end; ++i) {
+      const Vec<dim> mean = 0.5 * (points.previous_velocity[i] + points.velocity[i]);
+      const Vec<dim> by_pressure = -factor * points.pressure_gradient[i];
+      Vec<dim> projected = predicted_[i] + by_pressure;
+      if (carried_.exists())
+        projected -= carried_.velocity[i];
+      part[0] += by_pressure.dot(mean);
+      part[1] += (points.velocity[i] - projected).dot(mean);
+    }
+    return part;
+  });
+  report_.energy.projection = mass_of_point() * work[0];
+  report_.energy.damping = mass_of_point() * work[1];
+}
+
 template <int dim> void FluidSolver<dim>::leave_through_outlet() {
   Points<dim> &points = state.points;
   Vec<dim> low = walls.position.front(), high = low;
@@ -157,7 +195,9 @@ template <int dim> void FluidSolver<dim>::freeze_cloud() {
     cloud_.spacing = params_.spacing;
     leave_through_outlet();
     update_walls(points, walls, params_.spacing, cloud_);
+    const double before = energy();
     const ContactCounts<dim> contacts = keep_clear_of_walls(points, walls, params_.motion, cloud_);
+    report_.energy.correction += energy() - before;
     state.wall_returns += contacts.put_back;
     report_.contact_impulse = mass_of_point() * contacts.velocity_change;
     if (contacts.moved > 0)

@@ -20,6 +20,15 @@
 
 namespace sluice::fluid {
 
+/// What parts of a step change of the fluid's kinetic and potential energy [J]. Forces work on the
+/// mean of the velocities before and after the step: on that path gravity gives to the one energy
+/// what it takes from the other, and what is left of the whole change is viscosity's.
+struct EnergyChanges {
+  double correction = 0; // shift of the points, contact with walls
+  double projection = 0; // pressure: nothing in a closed tank, were it exact
+  double damping = 0;    // of point noise
+};
+
 /// Work of one step, for the run report.
 template <int dim> struct StepReport {
   RowCounts rows;
@@ -30,7 +39,8 @@ template <int dim> struct StepReport {
   ViscousRowCounts viscous_rows;
   int pressure_solves = 0;
   Vec<dim> contact_impulse = Vec<dim>::Zero(); // of walls on the points that touched them [N s/m]
-  int released = 0;                            // points that bear no tension next to air
+  EnergyChanges energy;
+  int released = 0;  // points that bear no tension next to air
   int cells_cut = 0; // Voronoi cells whose neighbours were not known from the last step
 };
 
@@ -75,6 +85,9 @@ public:
 
 private:
   void leave_through_outlet();
+  double energy_of_shift() const;
+  double energy() const;
+  void measure_work();
   double mass_of_point() const;
   double energy_of_point(const Vec<dim> &u, const Vec<dim> &x) const;
   void freeze_cloud();
