@@ -136,6 +136,17 @@ def energy_growth(run, until):
     return float(total.max() / total[0] - 1)
 
 
+def energy_split(run, until):
+    """{part: change of the energy up to `until`, over that at the start}; the parts sum to the whole."""
+    series = run.series("fluid.csv")
+    now = np.flatnonzero(series["time_s"] <= until)[-1]
+    total = series["kinetic_j"] + series["potential_j"]
+    parts = {part: float(series[f"by_{part}_j"][now] / total[0])
+             for part in ("correction", "projection", "damping")}
+    whole = float(total[now] / total[0] - 1)
+    return {"motion": whole - sum(parts.values()), **parts, "whole": whole}
+
+
 def time_at(curve, value):
     """When a growing curve first reaches `value`, by linear interpolation."""
     k = int(np.argmax(curve.value >= value))

@@ -21,6 +21,7 @@ import drop  # noqa: E402
 import square  # noqa: E402
 import surface  # noqa: E402
 import tank  # noqa: E402
+from transient import PowerLawFlow  # noqa: E402
 import vortex  # noqa: E402
 from run_folder import read_columns  # noqa: E402
 from vtk_files import Cloud  # noqa: E402
@@ -40,6 +41,45 @@ class DamBreakTest(unittest.TestCase):
         arrivals = [dam.arrival(dam.measured_pressure(s)) for s in dam.SENSOR_HEIGHT_M]
         self.assertEqual(arrivals, sorted(arrivals))
         self.assertTrue(2.3 < arrivals[0] < 2.5)
+
+
+class MadeUpRun:
+    def __init__(self, series):
+        self.columns = series
+
+    def series(self, _):
+        return self.columns
+
+
+class EnergySplitTest(unittest.TestCase):
+    def test_the_parts_sum_to_the_whole_change_up_to_the_time_asked_for(self):
+        run = MadeUpRun({"time_s": np.array([0.0, 1.0, 2.0]), "kinetic_j": np.array([0.0, 3.0, 5.0]),
+                         "potential_j": np.array([10.0, 8.0, 9.0]),
+                         "by_correction_j": np.array([0.0, 0.2, 9.0]),
+                         "by_projection_j": np.array([0.0, 0.5, 9.0]),
+                         "by_damping_j": np.array([0.0, -0.1, 9.0])})
+        split = dam.energy_split(run, 1.5)
+        self.assertAlmostEqual(split["whole"], 0.1)
+        self.assertAlmostEqual(split["motion"], 0.04)
+
+
+class TransientChannelTest(unittest.TestCase):
+    def test_it_ends_in_the_steady_profile(self):
+        for exponent in (0.5, 1):
+            flow = PowerLawFlow(exponent, 10.0, cells=60)
+            error = np.abs(flow.velocity(1.0, steps=40)
+                           - channel.exact_velocity(exponent, flow.height)).max()
+            print(f"n = {exponent:g}: {error:.1e}")
+            self.assertLess(error, 2e-3)  # second order of 60 cells that are half as wide at plates
+
+    def test_at_first_a_plate_drags_a_layer_along(self):
+        flow = PowerLawFlow(1, 1.0)
+        end = 1e-4  # Stokes' first problem: erfc(d / sqrt(4 nu t)), 0.01 thick
+        d = 1 - flow.height
+        layer = np.array([math.erfc(x / math.sqrt(4 * end)) for x in d])
+        error = np.abs(flow.velocity(end) - layer).max()
+        print(f"first layer: {error:.1e}")
+        self.assertLess(error, 0.03)  # the counterflow is of the layer's own thickness
 
 
 class TankTest(unittest.TestCase):
