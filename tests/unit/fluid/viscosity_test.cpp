@@ -369,7 +369,7 @@ public:
       for (int i = 0; i < frozen.size(); ++i)
         u[i] -= dt * force[i];
       diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(law_, 1), 1, dt, u,
-                       problem);
+                       u, problem);
     }
     double square = 0, size = 0;
     for (int i = 0; i < frozen.size(); ++i) {
