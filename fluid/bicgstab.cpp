@@ -80,6 +80,7 @@ private:
 
   // Begins anew from the residual of the present x.
   void start() {
+    since_start_ = 0;
     unit_ = result_.residual;
     rho_ = sum(n_, [&](int i) {
       m_.r[i] /= unit_;
@@ -89,9 +90,10 @@ private:
   }
 
   // One iteration; false when the residual is small enough, the count is used up, or the recurrence
-  // has broken down, after which the true residual decides how to go on.
+  // has broken down or become too long, after which the true residual decides how to go on.
   bool iterate() {
     ++result_.iterations;
+    ++since_start_;
     precondition(m_.p, m_.p_hat);
     const double shadow_v = multiply(m_.p_hat, m_.v, m_.r_shadow)[0];
     const double alpha = rho_ / shadow_v;
@@ -173,7 +175,7 @@ private:
     });
     const double beta = shadow_r / rho_ * (alpha / omega);
     rho_ = shadow_r;
-    const bool broken = !std::isfinite(beta) || beta == 0;
+    const bool broken = !std::isfinite(beta) || beta == 0 || since_start_ == longest_recurrence;
     if (is_small(r_r) || broken || result_.iterations >= options_.max_iterations)
       return false;
     for_each_row(n_, [&](int i) { m_.p[i] = m_.r[i] + beta * (m_.p[i] - omega * m_.v[i]); });
@@ -188,7 +190,12 @@ private:
   Preconditioner &preconditioner_;
   const SolveOptions &options_;
   KrylovMemory &m_;
+  // A recurrence that has not converged by then has lost its shadow residual and would not: ten
+  // times the usual count.
+  static constexpr int longest_recurrence = 40;
+
   int n_;
+  int since_start_ = 0;
   double target_ = 0, unit_ = 1, rho_ = 0, column_sum_ = 0;
   SolveResult result_;
 };
