@@ -102,7 +102,7 @@ template <int dim> Pace pace_of(const Points<dim> &points, double gravity, doubl
   const int n = std::max(points.size(), 1);
   const double speed2 = sum(points.size(), [&](int i) { return points.velocity[i].squaredNorm(); });
   const double speed = std::sqrt(speed2 / n), size = spacing * std::pow(n, 1.0 / dim);
-  return {speed / (2 * spacing), 2 * std::numbers::pi * speed / size};
+  return {0.1 * speed / spacing, 2 * std::numbers::pi * speed / size};
 }
 
 namespace {

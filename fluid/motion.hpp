@@ -66,7 +66,7 @@ struct Pace {
 };
 
 /// Next to air volume errors follow the shortest waves: both are their frequency sqrt(g / spacing).
-/// Without gravity: the rms speed over two spacings, the shortest mode, and 2 pi times it over the
+/// Without gravity: a tenth of the rms speed over the spacing, and 2 pi times it over the
 /// size of the fluid, a turn of the largest eddy. A divergence that corrects the volume errors of
 /// single cells, which are there on every irregular cloud, at the pace of the points would give a
 /// velocity error of their size that no refinement takes away.
