@@ -40,7 +40,8 @@ struct Contact {
 
 template <int dim>
 Contact resolve_contact(Vec<dim> &x, Vec<dim> &u, const Walls<dim> &walls,
-                        std::span<const int> candidates, double reach, double clearance) {
+                        std::span<const int> candidates, double reach, double clearance,
+                        bool is_held) {
   Contact contact;
   constexpr int sweeps = 4;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
@@ -53,6 +54,8 @@ Contact resolve_contact(Vec<dim> &x, Vec<dim> &u, const Walls<dim> &walls,
       contact.was_behind = contact.was_behind || (sweep == 0 && p.distance < 0);
       touched = contact.moved = true;
       x -= (limit - p.distance) * p.normal;
+      if (is_held && p.distance >= 0)
+        continue;
       const double approach = p.normal.dot(u - wall_velocity(walls, p));
       u -= std::max(approach, 0.0) * p.normal;
     }
@@ -81,7 +84,8 @@ ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &wa
           const auto candidates = cloud.near_faces.near(cloud.grid.cell(points.position[i]));
           const Vec<dim> before = points.velocity[i];
           const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
-                                                  candidates, cloud.radius, clearance);
+                                                  candidates, cloud.radius, clearance,
+                                                  points.at_surface[i] == SurfaceMemory::enclosed);
           const Vec<dim> change = points.velocity[i] - before;
           part[0] += contact.moved;
           part[1] += contact.was_behind;

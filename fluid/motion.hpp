@@ -42,9 +42,9 @@ template <int dim> struct ContactCounts {
 /// trapezoidal rule (the cloud lives at the stage positions; derived here).
 template <int dim> void move_points(Points<dim> &points, double dt, double lead);
 
-/// Puts points that are behind a wall or too close to it back to the clearance and removes their
-/// velocity towards it; two walls on opposite sides leave each at most 0.45 of the gap as
-/// clearance. Needs the cloud's projections.
+/// Puts points that are behind a wall or too close to it back to the clearance; those that were
+/// behind it or next to air lose their velocity towards it (others have a pressure). Two walls on
+/// opposite sides leave each at most 0.45 of the gap as clearance. Needs the cloud's projections.
 template <int dim>
 ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &walls,
                                        const MotionParams &params, const Cloud<dim> &cloud);

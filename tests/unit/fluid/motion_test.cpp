@@ -113,6 +113,19 @@ TEST(WallContact, PutsAPointBackFromBehindAWallAndTakesItsApproachVelocity) {
   EXPECT_NEAR((contact.velocity() - Vec<2>(2, 0)).norm(), 0, 1e-14);
 }
 
+// Pressure holds an enclosed point already; to take its velocity in every step would cost energy
+// per step. A point next to air meets the wall.
+TEST(WallContact, TakesTheApproachVelocityOfAPointNextToAirOnly) {
+  for (const SurfaceMemory memory : {SurfaceMemory::enclosed, SurfaceMemory::open}) {
+    FrozenCloud frozen({{0.5, 0.1 * h}}, testing::polyline({{0, 0}, {1, 0}}), h);
+    frozen.points.velocity[0] = {2, -3};
+    frozen.points.at_surface[0] = memory;
+    keep_clear_of_walls(frozen.points, frozen.walls, {}, frozen.cloud);
+    EXPECT_NEAR(frozen.points.position[0].y(), MotionParams().wall_clearance * h, 1e-15);
+    EXPECT_EQ(frozen.points.velocity[0], Vec<2>(2, memory == SurfaceMemory::open ? 0 : -3));
+  }
+}
+
 TEST(WallContact, LeavesAPointThatIsClearOrMovesAway) {
   const Walls<2> floor = testing::polyline({{0, 0}, {1, 0}});
   const Contact clear({0.5, 0.26 * h}, {2, -3}, floor);

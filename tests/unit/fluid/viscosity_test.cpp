@@ -368,8 +368,8 @@ public:
     for (int step = 0; step < 15; ++step) {
       for (int i = 0; i < frozen.size(); ++i)
         u[i] -= dt * force[i];
-      diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(law_, 1), 1, dt, u,
-                       u, problem);
+      diffuse_velocity(frozen.points, frozen.walls, frozen.cloud, Rheology(law_, 1), 1, dt, u, u,
+                       problem);
     }
     double square = 0, size = 0;
     for (int i = 0; i < frozen.size(); ++i) {
