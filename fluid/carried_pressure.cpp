@@ -35,7 +35,8 @@ template <int dim>
 void add_to_sources(const Points<dim> &points, const Cloud<dim> &cloud,
                     const CarriedPressure<dim> &carried, PressureProblem<dim> &problem) {
   for_each_point(points.size(), [&](int i) {
-    if (cloud.kind[i] != PointKind::interior)
+    // A row that is part of the surface's is no Laplacian: such a point finds its pressure anew.
+    if (cloud.kind[i] != PointKind::interior || cloud.openness[i] > 0)
       return;
     double known = 0; // off-diagonal entries are minus the weights of differences
     problem.matrix.for_each_entry(i, [&](int j, double value) {
@@ -85,14 +86,15 @@ void correct(const Points<dim> &points, const Cloud<dim> &cloud, std::span<const
 } // namespace
 
 template <int dim>
-void share_pressure(std::span<const double> viscosity, double factor, double spacing,
+void share_pressure(std::span<const double> viscosity, const Cloud<dim> &cloud, double factor,
                     VecView<dim> by_pressure, CarriedPressure<dim> &carried) {
   const int n = static_cast<int>(viscosity.size());
   carried.share.resize(n);
   carried.velocity.resize(n);
   for_each_point(n, [&](int i) {
-    const double stiffness = factor * viscosity[i] / (spacing * spacing);
-    carried.share[i] = 1 - 1 / (1 + stiffness * stiffness);
+    const double stiffness = factor * viscosity[i] / (cloud.spacing * cloud.spacing);
+    const bool is_emerging = cloud.openness[i] > 0 && cloud.openness[i] < 1;
+    carried.share[i] = is_emerging ? 0 : 1 - 1 / (1 + stiffness * stiffness);
     carried.velocity[i] = carried.share[i] * by_pressure[i];
   });
 }
@@ -130,13 +132,13 @@ void settle_pressure(const Cloud<dim> &cloud, CarriedPressure<dim> &carried, Poi
   for_each_point(n, [&](int i) { points.pressure[i] += carried.smoothing[i]; });
 }
 
-template void share_pressure(std::span<const double>, double, double, VecView<2>,
+template void share_pressure(std::span<const double>, const Cloud<2> &, double, VecView<2>,
                              CarriedPressure<2> &);
 template void add_carried_pressure(const Points<2> &, const Cloud<2> &, std::span<const double>,
                                    std::span<const double>, CarriedPressure<2> &,
                                    PressureProblem<2> &);
 template void settle_pressure(const Cloud<2> &, CarriedPressure<2> &, Points<2> &);
-template void share_pressure(std::span<const double>, double, double, VecView<3>,
+template void share_pressure(std::span<const double>, const Cloud<3> &, double, VecView<3>,
                              CarriedPressure<3> &);
 template void add_carried_pressure(const Points<3> &, const Cloud<3> &, std::span<const double>,
                                    std::span<const double>, CarriedPressure<3> &,

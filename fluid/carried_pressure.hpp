@@ -41,9 +41,9 @@ template <int dim> struct CarriedPressure {
 };
 
 /// The shares in a step of viscosity [Pa s], `factor` = dt / density [s m^3/kg], and what they keep
-/// of `by_pressure` = -dt/rho grad p_last [m/s].
+/// of `by_pressure` = -dt/rho grad p_last [m/s]. Points that emerge keep nothing.
 template <int dim>
-void share_pressure(std::span<const double> viscosity, double factor, double spacing,
+void share_pressure(std::span<const double> viscosity, const Cloud<dim> &cloud, double factor,
                     VecView<dim> by_pressure, CarriedPressure<dim> &carried);
 
 /// Adds beta p_last to sources and wall data of an assembled problem, whose solution then is the

@@ -15,7 +15,7 @@ namespace sluice::fluid {
 
 enum class PointKind : std::int32_t { // wide enough to be gathered
   interior,                           // pressure from the Poisson equation
-  surface, // at the free surface: pressure falls to zero half a spacing outside
+  surface, // at the free surface: pressure falls to zero at its depth outside
   thin,    // open on both sides, or nearly alone: pressure is zero
 };
 
@@ -45,7 +45,7 @@ template <int dim> struct Cloud {
   std::vector<int> wall_points;             // per slot: the point
   std::vector<PointWalls<dim>> point_walls; // projections within the kernel radius
   std::vector<PointKind> kind;
-  std::vector<Vec<dim>> surface_normal;  // unit, out of the fluid; zero for interior points
+  std::vector<Vec<dim>> surface_normal;  // unit, out of the fluid; zero where openness is 0
   std::vector<double> openness;          // 1: open, 0: interior; between: an interior point that
                                          // comes up to the surface [-]
   std::vector<double> surface_depth;     // of such a point below the surface, as far as its

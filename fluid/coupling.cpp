@@ -256,7 +256,8 @@ public:
       finish_step(loads, bridge.time());
       if (bridge.requires_writing_restart()) {
         write_restart(bridge);
-        start_anew();
+        if (bridge.is_coupling_ongoing())
+          start_anew();
       }
     }
     bridge.finalize();
@@ -284,8 +285,8 @@ private:
 
   void compute(double time, double dt, bool moves) {
     if (moves) {
-      check_step(dt);
       move_walls(start_.scene.prescribed, time, dt, solver_->walls);
+      check_step(dt);
       solver_->begin_step(dt);
     }
     solver_->iterate();

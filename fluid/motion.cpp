@@ -216,7 +216,7 @@ void plan_shift(Points<dim> &points, const Cloud<dim> &cloud, const MotionParams
                                params.agitation * cloud.spacing * own_direction<dim>(points.id[i]));
     shift += closing_move<dim>(cloud.centroid_offset[i], widest);
     const Vec<dim> &n = cloud.surface_normal[i];
-    shift -= n.dot(shift) * n;
+    shift -= cloud.openness[i] * n.dot(shift) * n;
     if (cloud.kind[i] == PointKind::thin)
       shift.setZero();
     if (is_crowded)

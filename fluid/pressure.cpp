@@ -278,7 +278,7 @@ int release_tension(Points<dim> &points, const Walls<dim> &walls, const Pressure
   for (const int i : changed) {
     assemble(i);
     for (const int j : cloud.neighbours.of(i))
-      if (cloud.kind[j] == PointKind::surface)
+      if (cloud.kind[j] != PointKind::thin && cloud.openness[j] > 0) // it has lost a donor
         assemble(j);
   }
   problem.has_open_point = problem.has_open_point || !changed.empty();

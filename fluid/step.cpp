@@ -53,7 +53,7 @@ template <int dim> void FluidSolver<dim>::iterate() {
     return bicgstab(scaled_, problem_.source, points.pressure, multigrid_, options, memory_);
   });
   if (!result.converged)
-    throw NoStep(
+    throw UserError(
         fmt::format("step {}: the pressure solve stopped after {} iterations at a residual "
                     "of {:.2e} Pa; reduce the time step",
                     state.step + 1, result.iterations, result.residual));
@@ -257,7 +257,7 @@ template <int dim> void FluidSolver<dim>::take_back_push() {
   if (is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
     return;
   for_each_point(n, [&](int i) { push_[i] -= projection_dt_ * params_.gravity; });
-  share_pressure(viscosity(), projection_dt_ / params_.density, params_.spacing, push_, carried_);
+  share_pressure(viscosity(), cloud_, projection_dt_ / params_.density, push_, carried_);
   for_each_point(n, [&](int i) { predicted_[i] += carried_.velocity[i]; });
 }
 

@@ -44,13 +44,6 @@ template <int dim> struct StepReport {
   int cells_cut = 0; // Voronoi cells whose neighbours were not known from the last step
 };
 
-/// A step that cannot be done at its present length. Whoever drives the solver may restore the
-/// state and try a shorter one; nobody may go on with it.
-class NoStep : public UserError {
-public:
-  using UserError::UserError;
-};
-
 template <int dim> class FluidSolver {
 public:
   explicit FluidSolver(const Scene<dim> &scene);
@@ -60,7 +53,7 @@ public:
 
   /// Moves the points, freezes the cloud at walls.position, assembles viscosity and pressure.
   void begin_step(double dt);
-  /// Pressure and wall loads for walls.velocity. Throws NoStep when the pressure solver fails, on
+  /// Pressure and wall loads for walls.velocity. Throws UserError when the pressure solver fails, on
   /// values that are not finite too.
   void iterate();
   /// Velocity after the pressure; plans the regularisation of the next move.

@@ -99,11 +99,14 @@ template <int dim>
 void set_viscosity(const Rheology &rheology, double relaxation, ViscousProblem<dim> &problem) {
   const int n = static_cast<int>(problem.velocity_gradient.size());
   problem.viscosity.resize(n);
+  const RheologyParams &bounds = rheology.params();
   rheology.with_law([&](const auto &law) {
     for_each_point(n, [&](int i) {
       const double now = law(shear_rate(problem.velocity_gradient[i]));
       double &mu = problem.viscosity[i];
-      mu = relaxation == 1 || mu == now ? now : mu * std::pow(now / mu, relaxation);
+      mu = relaxation == 1 || mu == now
+               ? now
+               : std::clamp(mu * std::pow(now / mu, relaxation), bounds.lowest, bounds.highest);
     });
   });
 }

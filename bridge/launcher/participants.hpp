@@ -3,8 +3,10 @@
 // [solid] starts sluice-solid where the fluid has a wall that it moves; the key `program` in a
 // table names another one, such as "sluice-calculix". Every program is called twice:
 //
-//   PROGRAM CASE.toml [--set TABLE.KEY=VALUE]... --check       read all, compute nothing, write
-//   nothing PROGRAM CASE.toml [--set ...]... [--restart FILE] --out DIR
+//   PROGRAM CASE.toml [--set TABLE.KEY=VALUE]... --check   (reads all, computes and writes nothing)
+//   PROGRAM CASE.toml [--set ...]... [--restart FILE] --out DIR
+//
+// --set and --restart are passed on only where the user gives them.
 #pragma once
 
 #include "bridge/base/config.hpp"
