@@ -61,6 +61,22 @@ void find_walls(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &
   });
 }
 
+// Distance from a point to the nearest wall, at most the kernel radius [m].
+template <int dim> double distance_to_nearest_wall(const Cloud<dim> &cloud, int i) {
+  const PointWalls<dim> *const walls = cloud.walls_of(i);
+  return walls != nullptr && walls->count > 0 ? std::abs(walls->projection[0].distance)
+                                              : cloud.radius;
+}
+
+// No wall enters the balls around two points up to their nearest walls: where they overlap they hold
+// the line between the points.
+template <int dim>
+bool certainly_in_sight(const Points<dim> &points, const Cloud<dim> &cloud, int i, int j) {
+  constexpr double rounding = 1e-9;
+  const double clear = distance_to_nearest_wall(cloud, i) + distance_to_nearest_wall(cloud, j);
+  return (1 - rounding) * clear * clear > (points.position[j] - points.position[i]).squaredNorm();
+}
+
 template <int dim>
 void drop_hidden_neighbours(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &cloud) {
   for_each_index(static_cast<int>(cloud.wall_points.size()), [&](int k) {
@@ -69,7 +85,8 @@ void drop_hidden_neighbours(const Points<dim> &points, const Walls<dim> &walls, 
     const auto candidates = cloud.near_faces.near(cloud.grid.cell(x));
     int *const first = cloud.neighbours.first(i);
     int *const last = std::remove_if(first, first + cloud.neighbours.count[i], [&](int j) {
-      return is_hidden(walls, candidates, x, points.position[j]);
+      return !certainly_in_sight(points, cloud, i, j) &&
+             is_hidden(walls, candidates, x, points.position[j]);
     });
     cloud.neighbours.count[i] = static_cast<int>(last - first);
   });

@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 namespace sluice::fluid {
@@ -58,6 +59,51 @@ TEST(Neighbours, HiddenOnesAreRemovedOnBothSidesOfAPlate) {
       ASSERT_EQ(pairs.count({i, j}), pairs.count({j, i}));
     }
   EXPECT_GT(hidden, 100); // the plate does stand between points
+}
+
+// A wavy sheet of triangles that are finer than the spacing, with points on both sides of it.
+Walls<3> wavy_sheet(int n) {
+  Walls<3> sheet;
+  sheet.names = {"sheet"};
+  sheet.slip = {Slip::none};
+  for (int j = 0; j <= n; ++j)
+    for (int i = 0; i <= n; ++i)
+      sheet.position.emplace_back(double(i) / n, double(j) / n,
+                                  0.3 + 0.05 * std::sin(9.0 * i / n) * std::cos(7.0 * j / n));
+  sheet.velocity.assign(sheet.position.size(), Vec<3>::Zero());
+  for (int j = 0; j < n; ++j)
+    for (int i = 0; i < n; ++i) {
+      const int a = j * (n + 1) + i, b = a + 1, c = b + n + 1, d = a + n + 1;
+      for (const std::array<int, 3> &corners : {std::array{a, b, c}, std::array{a, c, d}})
+        sheet.faces.push_back({corners, 0, static_cast<int>(sheet.faces.size())});
+    }
+  link_faces(sheet);
+  return sheet;
+}
+
+TEST(Neighbours, ThoseInSightOfAFineSurfaceAreThoseOfATestOfEveryPair) {
+  const double h = 0.1;
+  std::vector<Vec<3>> position = testing::lattice({12, 12, 6}, h, 0.3, 7);
+  for (Vec<3> &x : position)
+    x -= Vec<3>(h, h, 0); // beyond the sheet's border too
+  const testing::FrozenCloudIn<3> frozen(position, wavy_sheet(24), h);
+  const auto all = testing::every_face(frozen.walls);
+  int hidden = 0;
+  for (int i = 0; i < frozen.size(); ++i) {
+    const Vec<3> &x = frozen.points.position[i];
+    std::vector<int> expected;
+    for (int j = 0; j < frozen.size(); ++j) {
+      const Vec<3> &y = frozen.points.position[j];
+      if (i == j || (x - y).norm() >= frozen.cloud.radius)
+        continue;
+      if (is_hidden(frozen.walls, all, x, y))
+        ++hidden;
+      else
+        expected.push_back(j);
+    }
+    ASSERT_EQ(sorted(frozen.cloud.neighbours.of(i)), expected) << "point " << i;
+  }
+  EXPECT_GT(hidden, 1000);
 }
 
 TEST(Neighbours, SortingKeepsEveryPointsDataTogether) {
