@@ -2,7 +2,8 @@
 """The channel: its exact profile, and the error of a run's.
 
 Between plates at y = 0 (at rest) and y = 1 (unit speed) the shear stress is linear, tau = tau_0 + G y, and
-u' = sign(tau) |tau|^(1/n). The two unknowns follow from u(1) = 1, no net flux and integrals in closed form:
+u' = sign(tau) (|tau| - tau_y)^(1/n) where |tau| exceeds the yield stress, which is zero for a power law. The two
+unknowns follow from u(1) = 1, no net flux and integrals in closed form:
 
     int u' dy = 1,    int u dy = 1 - int y u' dy = 0.
 """
@@ -12,39 +13,42 @@ import numpy as np
 TOLERANCE = 1e-13
 
 
-def moments(exponent, wall_stress, gradient):
+def moments(exponent, wall_stress, gradient, yield_stress):
     """(int u' dy, int y u' dy) over the channel."""
     power = 1 / exponent
 
     def integrals(stress):   # of u' and of stress times u' over the stress
-        size = abs(stress)
-        return (size**(power + 1) / (power + 1),
-                np.sign(stress) * size**(power + 2) / (power + 2))
+        excess = max(abs(stress) - yield_stress, 0.0)
+        first = excess**(power + 1) / (power + 1)
+        return first, np.sign(stress) * (excess**(power + 2) / (power + 2) + yield_stress * first)
     p1, q1 = integrals(wall_stress + gradient)
     p0, q0 = integrals(wall_stress)
     return (p1 - p0) / gradient, ((q1 - q0) - wall_stress * (p1 - p0)) / gradient**2
 
 
-def stresses(exponent):
-    """(tau_0, G) by Newton's method from the Newtonian ones, -2 and 6."""
-    unknown = np.array([-2.0, 6.0])
+def stresses(exponent, yield_stress=0.0):
+    """(tau_0, G) by Newton's method from the Newtonian ones, -2 and 6, and the yield stress at the plates."""
+    unknown = np.array([-2.0 - yield_stress, 6.0 + 2 * yield_stress])
     for _ in range(100):
-        residual = np.array(moments(exponent, *unknown)) - 1
+        residual = np.array(moments(exponent, *unknown, yield_stress)) - 1
         if np.abs(residual).max() < TOLERANCE:
             return tuple(unknown)
         step = 1e-7
-        columns = [(np.array(moments(exponent, *(unknown + step * e))) - 1 - residual) / step
+        columns = [(np.array(moments(exponent, *(unknown + step * e), yield_stress)) - 1 - residual) / step
                    for e in np.eye(2)]
         unknown = unknown - np.linalg.solve(np.column_stack(columns), residual)
     raise ArithmeticError(f"no profile for the exponent {exponent:g}: residual {residual}")
 
 
-def exact_velocity(exponent, y):
+def exact_velocity(exponent, y, yield_stress=0.0):
     """u at the heights y."""
-    wall_stress, gradient = stresses(exponent)
+    wall_stress, gradient = stresses(exponent, yield_stress)
     power = 1 / exponent
+
+    def excess(stress):
+        return np.maximum(np.abs(stress) - yield_stress, 0)
     stress = wall_stress + gradient * np.asarray(y, float)
-    return (np.abs(stress)**(power + 1) - abs(wall_stress)**(power + 1)) / (gradient * (power + 1))
+    return (excess(stress)**(power + 1) - excess(wall_stress)**(power + 1)) / (gradient * (power + 1))
 
 
 def name_of(exponent, points):

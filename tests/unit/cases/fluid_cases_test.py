@@ -183,6 +183,21 @@ class ChannelTest(unittest.TestCase):
             self.assertAlmostEqual(u[-1], 1, delta=1e-10)
             self.assertAlmostEqual(float(np.trapz(u, y)), 0, delta=1e-7)   # of the trapezoids
 
+    def test_a_plug_slides_as_a_whole_and_as_wide_as_the_yield_stress_allows(self):
+        y, viscosity, yield_stress = np.linspace(0, 1, 20001), 1, 2
+        u = channel.exact_velocity(1, y, yield_stress)
+        wall_stress, gradient = channel.stresses(1, yield_stress)
+        stress = wall_stress + gradient * y
+        plug = np.abs(stress) < yield_stress
+        self.assertAlmostEqual(plug.mean(), 2 * yield_stress / gradient, delta=1e-4)   # two spacings
+        np.testing.assert_allclose(u[plug], u.min(), atol=1e-12)
+        self.assertAlmostEqual(u[-1], 1, delta=1e-10)
+        self.assertAlmostEqual(float(np.trapz(u, y)), 0, delta=1e-7)   # of the trapezoids
+        shear = np.gradient(u, y)
+        away = (y > 0) & (y < 1) & (np.abs(np.abs(stress) - yield_stress) > 1e-2)
+        expected = np.where(plug, 0, (stress - np.sign(stress) * yield_stress) / viscosity)
+        np.testing.assert_allclose(shear[away], expected[away], atol=1e-7)   # central: exact for parabolas
+
     def test_a_newtonian_profile_is_a_parabola(self):
         y = np.linspace(0, 1, 11)
         np.testing.assert_allclose(channel.exact_velocity(1, y), 3 * y**2 - 2 * y, atol=1e-12)
