@@ -250,11 +250,13 @@ template <int dim> bool FluidSolver<dim>::viscosity_is_negligible() const {
              params_.negligible_viscosity;
 }
 
-// Gravity and pressure act by the projection, as far as a stiff point does not keep them.
+// Gravity and pressure act by the projection, as far as a stiff point does not keep them. Next to a
+// free surface none may: its points, which no pressure of their own holds, would be thrown out.
 template <int dim> void FluidSolver<dim>::take_back_push() {
   const int n = state.points.size();
   for_each_point(n, [&](int i) { predicted_[i] -= push_[i]; });
-  if (is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
+  if (cloud_.has_air ||
+      is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
     return;
   for_each_point(n, [&](int i) { push_[i] -= projection_dt_ * params_.gravity; });
   share_pressure(viscosity(), cloud_, projection_dt_ / params_.density, push_, carried_);
