@@ -97,9 +97,10 @@ def case_file(options, folder):
     status = subprocess.run(command).returncode
     if status != 0:
         sys.exit(EXIT_USAGE)
+    # --spacing went into the file already; a --set of the user's goes to the programs.
     rest = [text for text in overrides_of(options)
-            if text not in own and not text.startswith("fluid.spacing_m=")]
-    return file, rest
+            if text in options.overrides or not text.startswith("fluid.spacing_m=")]
+    return file, [text for text in rest if text not in own]
 
 
 def output_folder(options):

@@ -49,6 +49,7 @@ template <int dim> struct FluidParams {
   double outlet_x = 1e300;
   bool open_sides = false;
   bool free_surface = true;
+  std::string stiff_pressure = "auto";
   bool holds_tension = false;
   std::string coupled_walls = "move";
   std::string start_state;
@@ -116,6 +117,10 @@ template <int dim> struct FluidParams {
                "has no outlet: outlet_x_m is for water next to air");
     read("holds_tension", holds_tension,
          "points next to air may pull: for a drop or a patch held together by nothing else");
+    read("stiff_pressure", stiff_pressure,
+         "where viscosity is stiff: \"kept\", corrected by the projection, \"renewed\" by it, or "
+         "\"auto\": kept without a free surface")
+        .one_of({"auto", "kept", "renewed"});
     read("coupled_walls", coupled_walls, "what coupled walls do").one_of({"move", "stay"});
     read("fields", fields, "of the points, written every case.output_interval_s")
         .check(unknown_field(fields).empty(),

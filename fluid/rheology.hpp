@@ -120,8 +120,8 @@ public:
     std::visit(
         [&](const auto &law) {
           body([&](double gamma) {
-            const double seen = std::min(std::hypot(gamma, params_.lowest_shear_rate),
-                                         params_.highest_shear_rate);
+            const double seen =
+                std::min(std::hypot(gamma, params_.lowest_shear_rate), params_.highest_shear_rate);
             return std::clamp(law(seen), params_.lowest, params_.highest);
           });
         },

@@ -250,12 +250,16 @@ template <int dim> bool FluidSolver<dim>::viscosity_is_negligible() const {
              params_.negligible_viscosity;
 }
 
-// Gravity and pressure act by the projection, as far as a stiff point does not keep them. Next to a
-// free surface none may: its points, which no pressure of their own holds, would be thrown out.
+template <int dim> bool FluidSolver<dim>::keeps_stiff_pressure() const {
+  return params_.stiff_pressure == "kept" ||
+         (params_.stiff_pressure == "auto" && !params_.free_surface);
+}
+
+// Gravity and pressure act by the projection, as far as a stiff point does not keep them.
 template <int dim> void FluidSolver<dim>::take_back_push() {
   const int n = state.points.size();
   for_each_point(n, [&](int i) { predicted_[i] -= push_[i]; });
-  if (cloud_.has_air ||
+  if (!keeps_stiff_pressure() ||
       is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
     return;
   for_each_point(n, [&](int i) { push_[i] -= projection_dt_ * params_.gravity; });

@@ -53,8 +53,8 @@ public:
 
   /// Moves the points, freezes the cloud at walls.position, assembles viscosity and pressure.
   void begin_step(double dt);
-  /// Pressure and wall loads for walls.velocity. Throws UserError when the pressure solver fails, on
-  /// values that are not finite too.
+  /// Pressure and wall loads for walls.velocity. Throws UserError when the pressure solver fails,
+  /// on values that are not finite too.
   void iterate();
   /// Velocity after the pressure; plans the regularisation of the next move.
   void end_step();
@@ -88,6 +88,7 @@ private:
   void push_by_known_forces();
   bool viscosity_is_negligible() const;
   void predict_velocity();
+  bool keeps_stiff_pressure() const;
   void take_back_push();
   void assemble();
 
@@ -106,8 +107,8 @@ private:
   CarriedPressure<dim> carried_;
   std::vector<double> target_divergence_;
   std::vector<double> cell_average_; // memory of the volume control
-  std::vector<char> leaves_; // per point
-  std::vector<Cell> cells_;  // per point: of the multigrid
+  std::vector<char> leaves_;         // per point
+  std::vector<Cell> cells_;          // per point: of the multigrid
   ScaledMatrix scaled_;
   Multigrid multigrid_;
   KrylovMemory memory_;

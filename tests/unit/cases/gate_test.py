@@ -125,12 +125,12 @@ class ValidateTest(RunTest):
                               capture_output=True, text=True)
         self.assertEqual((done.returncode, done.stdout), (3, self.validate().stdout))
 
-    def test_folder_without_series_is_refused_with_its_name(self):
+    def test_folder_without_series_is_incomplete_and_the_page_names_it(self):
         self.write()
         (self.path / "tip.csv").unlink()
         done = self.validate()
         self.assertEqual(done.returncode, 1)
-        self.assertRegex(done.stderr, r"validate: .*tip\.csv: is not there")
+        self.assertRegex(done.stdout, r"INCOMPLETE: .*tip\.csv: is not there")
 
     def test_run_without_a_row_is_refused(self):
         self.write()
