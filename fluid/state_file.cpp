@@ -2,10 +2,10 @@
 #include "fluid/state_file.hpp"
 
 #include "bridge/base/check.hpp"
+#include "bridge/base/hdf5_file.hpp"
 
 #include <array>
 #include <cmath>
-#include <hdf5.h>
 #include <string>
 #include <type_traits>
 
@@ -230,25 +230,11 @@ private:
   hsize_t n_points_ = unknown;
 };
 
-// The library prints every failure by itself unless told not to; ours are in the exceptions.
-class Quiet {
-public:
-  Quiet() {
-    H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, data_); }
-
-private:
-  H5E_auto2_t print_ = nullptr;
-  void *data_ = nullptr;
-};
-
 } // namespace
 
 template <int dim>
 void write_state(const std::filesystem::path &file, const SavedState<dim> &saved) {
-  const Quiet quiet;
+  const hdf5::Quiet quiet;
   std::filesystem::path unfinished = file;
   unfinished += ".part";
   std::error_code error;
@@ -263,7 +249,7 @@ void write_state(const std::filesystem::path &file, const SavedState<dim> &saved
 }
 
 template <int dim> SavedState<dim> read_state(const std::filesystem::path &file) {
-  const Quiet quiet;
+  const hdf5::Quiet quiet;
   check(std::filesystem::exists(file), "{}: there is no such file", file.string());
   return Reader(file).read<dim>();
 }

@@ -2,8 +2,8 @@
 #include "bridge/calculix/state_file.hpp"
 
 #include "bridge/base/check.hpp"
+#include "bridge/base/hdf5_file.hpp"
 
-#include <hdf5.h>
 #include <hdf5_hl.h>
 
 namespace sluice::calculix {
@@ -12,37 +12,8 @@ namespace {
 constexpr const char *format_name = "sluice-calculix-state";
 constexpr int format_version = 1;
 
-// Closed at the end of its scope.
-class File {
-public:
-  explicit File(hid_t id) : id_(id) {}
-  File(const File &) = delete;
-  File &operator=(const File &) = delete;
-  ~File() {
-    if (id_ >= 0)
-      H5Fclose(id_);
-  }
-  operator hid_t() const { return id_; }
-
-private:
-  hid_t id_;
-};
-
-// The library prints every failure by itself unless told not to; ours are in the exceptions.
-class Quiet {
-public:
-  Quiet() {
-    H5Eget_auto2(H5E_DEFAULT, &print_, &stream_);
-    H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
-  }
-  Quiet(const Quiet &) = delete;
-  Quiet &operator=(const Quiet &) = delete;
-  ~Quiet() { H5Eset_auto2(H5E_DEFAULT, print_, stream_); }
-
-private:
-  H5E_auto2_t print_ = nullptr;
-  void *stream_ = nullptr;
-};
+using hdf5::File;
+using hdf5::Quiet;
 
 bool write_bytes(hid_t file, const char *name, const std::vector<std::byte> &bytes) {
   const hsize_t size = bytes.size();
