@@ -11,7 +11,7 @@ void move_walls(const std::vector<PrescribedWall<dim>> &prescribed, double time,
       const Vec<dim> &x = wall.at_rest[k];
       const Vec<dim> before = wall.displacement(x, time), after = wall.displacement(x, time + dt);
       walls.position[wall.first + k] = x + after;
-      walls.velocity[wall.first + k] = (after - before) / dt + wall.sliding;
+      walls.velocity[wall.first + k] = (after - before) / dt + wall.sliding[k];
     }
 }
 

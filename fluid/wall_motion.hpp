@@ -11,10 +11,10 @@ namespace sluice::fluid {
 
 /// The displacement of one wall's vertices as a function of their place at t = 0 and of the time.
 template <int dim> struct PrescribedWall {
-  int first = 0;                       // of its vertices
-  std::vector<Vec<dim>> at_rest;       // [m], without displacement
-  Formula<dim> displacement;           // [m]
-  Vec<dim> sliding = Vec<dim>::Zero(); // [m/s], on top: a belt that runs along itself
+  int first = 0;                 // of its vertices
+  std::vector<Vec<dim>> at_rest; // [m], without displacement
+  Formula<dim> displacement;     // [m]
+  std::vector<Vec<dim>> sliding; // [m/s], on top: a belt that runs along itself
 };
 
 /// Puts the prescribed walls where they are at `time` + `dt`, with the mean velocity of that step.

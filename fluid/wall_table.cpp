@@ -50,8 +50,7 @@ public:
     if (wall.file.empty())
       sweep(wall);
     else
-      add_surface(surface, wall.reversed);
-    walls_.velocity.resize(walls_.position.size(), place(wall.velocity, 0));
+      add_surface(surface, wall.reversed, place(wall.velocity, 0));
     if (!wall.coupled)
       return;
     for (int v = first; v < static_cast<int>(walls_.position.size()); ++v)
@@ -81,26 +80,36 @@ public:
   }
 
 private:
+  /// A point of an outline, and the share of the wall's velocity that it has.
+  struct OutlinePoint {
+    Vec<2> position;
+    double velocity_share;
+  };
+
   void sweep(const WallParams<dim> &wall) {
     const int first = static_cast<int>(walls_.position.size());
     const int first_face = static_cast<int>(walls_.faces.size());
     check(dim == 2 || z_.back() > 0,
           "wall '{}': points_m are swept along z over depth_m, which is 0", wall.name);
-    const std::vector<Vec<2>> outline = cut_into_segments(wall);
-    for (const Vec<2> &x : outline)
-      for (const double z : z_)
-        walls_.position.push_back(place(x, z));
+    const std::vector<OutlinePoint> outline = cut_into_segments(wall);
+    for (const OutlinePoint &p : outline)
+      for (const double z : z_) {
+        walls_.position.push_back(place(p.position, z));
+        walls_.velocity.push_back(place(p.velocity_share * wall.velocity, 0));
+      }
     for (int k = 1; k < static_cast<int>(outline.size()); ++k)
       add_segment(first + (k - 1) * n_z(), first + k * n_z());
     for (int f = first_face; f < static_cast<int>(walls_.faces.size()); ++f)
       walls_.faces[f].number = f - first_face;
   }
 
-  void add_surface([[maybe_unused]] const SurfaceMesh &surface, [[maybe_unused]] bool reversed) {
+  void add_surface([[maybe_unused]] const SurfaceMesh &surface, [[maybe_unused]] bool reversed,
+                   [[maybe_unused]] const Vec<dim> &velocity) {
     if constexpr (dim == 3) {
       const int first = static_cast<int>(walls_.position.size());
       walls_.position.insert(walls_.position.end(), surface.position.begin(),
                              surface.position.end());
+      walls_.velocity.resize(walls_.position.size(), velocity);
       for (std::size_t k = 0; k < surface.triangles.size(); ++k) {
         auto [a, b, c] = surface.triangles[k];
         if (reversed)
@@ -140,8 +149,12 @@ private:
       }
   }
 
-  static std::vector<Vec<2>> cut_into_segments(const WallParams<dim> &wall) {
-    std::vector<Vec<2>> outline{wall.points.front()};
+  static double velocity_share(const WallParams<dim> &wall, std::size_t k) {
+    return wall.velocity_shares.empty() ? 1.0 : wall.velocity_shares[k];
+  }
+
+  static std::vector<OutlinePoint> cut_into_segments(const WallParams<dim> &wall) {
+    std::vector<OutlinePoint> outline{{wall.points.front(), velocity_share(wall, 0)}};
     for (std::size_t k = 1; k < wall.points.size(); ++k) {
       check((wall.points[k] - wall.points[k - 1]).norm() > 1e-9,
             "wall '{}': points {} and {} coincide at {} m", wall.name, k - 1, k,
@@ -151,14 +164,15 @@ private:
             "wall '{}': velocity_m_s = [{}, {}] points across the leg from point {} to {}; it may "
             "only slide along itself",
             wall.name, wall.velocity.x(), wall.velocity.y(), k - 1, k);
-      cut_leg(wall, wall.points[k], outline);
+      cut_leg(wall, {wall.points[k], velocity_share(wall, k)}, outline);
     }
     return outline;
   }
 
-  static void cut_leg(const WallParams<dim> &wall, const Vec<2> &to, std::vector<Vec<2>> &outline) {
-    const Vec<2> from = outline.back();
-    const double length = (to - from).norm();
+  static void cut_leg(const WallParams<dim> &wall, const OutlinePoint &to,
+                      std::vector<OutlinePoint> &outline) {
+    const OutlinePoint from = outline.back();
+    const double length = (to.position - from.position).norm();
     constexpr double most_pieces = 1e6;
     const double wanted =
         wall.segment_length > 0 ? std::ceil(length / wall.segment_length - 1e-9) : 1;
@@ -167,10 +181,12 @@ private:
           "pieces, at most {:.0e} are handled",
           wall.name, wall.segment_length, length, wanted, most_pieces);
     const int pieces = std::max(1, static_cast<int>(wanted));
-    for (int k = 1; k <= pieces; ++k) {
+    for (int k = 1; k < pieces; ++k) {
       const double t = static_cast<double>(k) / pieces;
-      outline.push_back(k == pieces ? to : Vec<2>((1 - t) * from + t * to));
+      outline.push_back({(1 - t) * from.position + t * to.position,
+                         (1 - t) * from.velocity_share + t * to.velocity_share});
     }
+    outline.push_back(to);
   }
 
   Walls<dim> &walls_;
@@ -194,7 +210,7 @@ PrescribedWall<dim> prescribe(const WallParams<dim> &wall, int first, Walls<dim>
   law.first = first;
   law.at_rest.assign(walls.position.begin() + first, walls.position.end());
   law.displacement = Formula<dim>(wall.displacement);
-  law.sliding.template head<2>() = wall.velocity;
+  law.sliding.assign(walls.velocity.begin() + first, walls.velocity.end());
   for (std::size_t k = 0; k < law.at_rest.size(); ++k)
     walls.position[first + k] += law.displacement(law.at_rest[k], 0);
   return law;

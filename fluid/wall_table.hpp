@@ -23,6 +23,7 @@ template <int dim> struct WallParams {
   bool coupled = false;
   double segment_length = 0;
   Vec<2> velocity{0, 0};
+  std::vector<double> velocity_shares;
   std::vector<std::string> displacement;
 
   template <class Reader> void describe(Reader &read) {
@@ -43,6 +44,10 @@ template <int dim> struct WallParams {
     read("coupled", coupled, "moves with the partner of the bridge");
     read("segment_length_m", segment_length, "longest segment; 0 keeps the given ones").at_least(0);
     read("velocity_m_s", velocity, "of a wall that slides along itself, as a lid does");
+    auto shares = read("velocity_shares", velocity_shares,
+                       "of velocity_m_s at each of points_m, linear in between; none: all of it");
+    shares.check(velocity_shares.empty() || velocity_shares.size() == points.size(),
+                 "one share for each of the points_m");
     auto law = read("displacement_m", displacement,
                     "formulas in x, y (z) and t of a wall that moves by a law of its own");
     const std::string problem = problem_of<dim>(displacement);

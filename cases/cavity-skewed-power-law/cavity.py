@@ -28,12 +28,16 @@ class Cavity:
     exponent: float = 1.5
     points_per_side: int = 100
     courant: float = 0.2
+    lid_ramp: float = 2.0
 
     def __post_init__(self):
         if not 10 <= self.angle_deg <= 170:
             raise ValueError(f"parameters.angle_deg = {self.angle_deg:g} is not in 10 ... 170")
         if min(self.reynolds, self.exponent, self.points_per_side, self.courant) <= 0:
             raise ValueError("reynolds, exponent, points_per_side and courant are above zero")
+        if not 0 < self.lid_ramp < self.points_per_side / 2:
+            raise ValueError(f"parameters.lid_ramp = {self.lid_ramp:g} is not between 0 and half of "
+                             "points_per_side")
 
     def with_spacing(self, spacing):
         return dataclasses.replace(self, points_per_side=round(math.sqrt(self.sine) / spacing))
@@ -47,7 +51,8 @@ class Cavity:
             "fluid.rheology": {"consistency_pa_s_n": 1 / self.reynolds, "exponent": self.exponent,
                                "highest_shear_rate_1_s": self.highest_shear_rate},
             "fluid.wall.sides": {"points_m": [c[3], c[0], c[1], c[2]]},
-            "fluid.wall.lid": {"points_m": [c[2], c[3]]},
+            "fluid.wall.lid": {"points_m": [c[2], self.place(1 - self.ramp, 1),
+                                            self.place(self.ramp, 1), c[3]]},
             "fluid.probe.ab": {"from_m": self.place(0.5, 0), "to_m": self.place(0.5, 1)},
             "fluid.probe.cd": {"from_m": self.place(0, 0.5), "to_m": self.place(1, 0.5)}}
 
@@ -67,6 +72,15 @@ class Cavity:
         bound; there alone the law is cut off.
         """
         return self.points_per_side / 2
+
+    @property
+    def ramp(self):
+        """Length at either end of the lid over which its speed rises from zero, of the side.
+
+        With a jump the fluid of a corner would have to turn within a spacing, with a pressure and
+        a stress without bound.
+        """
+        return self.lid_ramp / self.points_per_side
 
     @property
     def corners(self):

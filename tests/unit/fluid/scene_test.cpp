@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/scene.hpp"
+#include "fluid/wall_motion.hpp"
 #include "tests/support/fluid_cases.hpp"
 
 #include <gtest/gtest.h>
@@ -45,6 +46,31 @@ TEST(Scene, ALatticeFillsAnyConvexWaterWhereverItLiesAndHoweverItIsTurned) {
     const Scene<2> scene = scene_of(text, {std::string("fluid.lattice_angle_deg=") + angle});
     EXPECT_NEAR(volume_error(scene), 0, 0.035) << angle; // half a point per spacing of the outline
   }
+}
+
+// A belt that starts and ends gently: linear between the shares, on the corners of cut legs too.
+TEST(Scene, AWallSlidesWithTheSharesOfItsVelocity) {
+  const std::string belt = "[fluid]\nspacing_m = 0.1\nopen_sides = true\n"
+                           "water_m = [[0, 0], [1, 0], [1, 1], [0, 1]]\n"
+                           "[[fluid.wall]]\nname = \"floor\"\n"
+                           "points_m = [[0, 0], [0.2, 0], [0.8, 0], [1, 0]]\n"
+                           "segment_length_m = 0.1\nvelocity_m_s = [2, 0]\n"
+                           "velocity_shares = [0, 1, 0.5, 0]\n";
+  const std::string rides = "displacement_m = [\"0\", \"0.3*t\"]\n";
+  for (Scene<2> scene : {scene_of(belt), scene_of(belt + rides)}) {
+    const bool moves = !scene.prescribed.empty();
+    move_walls(scene.prescribed, 0.0, 0.1, scene.walls);
+    ASSERT_EQ(scene.walls.position.size(), 11u);
+    for (std::size_t k = 0; k < scene.walls.position.size(); ++k) {
+      const double x = scene.walls.position[k].x();
+      const double share = x < 0.2 ? 5 * x : x < 0.8 ? 1 - (x - 0.2) / 1.2 : 2.5 * (1 - x);
+      EXPECT_NEAR(scene.walls.velocity[k].x(), 2 * share, 1e-14) << x;
+      EXPECT_NEAR(scene.walls.velocity[k].y(), moves ? 0.3 : 0, 1e-14) << x;
+    }
+  }
+  const std::string message =
+      message_of([&] { scene_of(replaced(belt, "[0, 1, 0.5, 0]", "[0, 1, 0]")); });
+  EXPECT_TRUE(contains(message, "velocity_shares")) << message;
 }
 
 TEST(Scene, RefusesWaterBeyondTheOutlet) {
