@@ -57,6 +57,7 @@ template <int dim> struct FluidParams {
   int time_order = 1;
   double courant = 0;
   double pressure_tolerance = 1e-6;
+  std::string pressure_rows = "quadratic";
   double row_guard = 0.1;
   double gradient_guard = 20;
   double noise_damping = 1;
@@ -140,6 +141,10 @@ template <int dim> struct FluidParams {
     read("pressure_tolerance", pressure_tolerance, "residual of the pressure, relative")
         .at_least(1e-12)
         .at_most(1e-2);
+    read("pressure_rows", pressure_rows,
+         "\"quadratic\": least squares of second order; \"renormalised\": the linear ones of the "
+         "method as published")
+        .one_of({"quadratic", "renormalised"});
     read("row_guard", row_guard, "largest share of negative weights in a pressure row").positive();
     read("gradient_guard", gradient_guard,
          "largest norm of a pressure gradient's functional, times the kernel radius")

@@ -111,7 +111,7 @@ void History<dim>::update_extremes(const FluidSolver<dim> &solver, const Integra
   energy_changes_.correction += changes.correction;
   energy_changes_.projection += changes.projection;
   energy_changes_.damping += changes.damping;
-  guarded_rows_ += solver.report().rows.linear + solver.report().rows.plain;
+  guarded_rows_ += solver.report().rows.guarded();
   pressure_iterations_ += solver.report().pressure_iterations;
   pressure_solves_ += solver.report().pressure_solves;
   cells_ += solver.state.points.size();
@@ -154,7 +154,7 @@ void History<dim>::record(const FluidSolver<dim> &solver, const bridge::Interfac
   for (const Vec<dim> &v : {now.momentum, wall_force, state.outlet_momentum})
     row.insert(row.end(), v.begin(), v.end());
   row.insert(row.end(),
-             {static_cast<double>(solver.report().rows.linear + solver.report().rows.plain),
+             {static_cast<double>(solver.report().rows.guarded()),
               static_cast<double>(solver.report().pressure_iterations),
               static_cast<double>(state.wall_returns), static_cast<double>(state.lost_points),
               static_cast<double>(state.points.size())});
@@ -234,6 +234,7 @@ void History<dim>::write_summary(const FluidSolver<dim> &solver, const std::stri
   summary["viscous_iterations_per_step"] = static_cast<double>(viscous_iterations_) / n;
   const RowCounts &pressure_rows = solver.report().rows;
   summary["pressure_rows_last_step"] = {{"quadratic", pressure_rows.quadratic},
+                                        {"blended", pressure_rows.blended},
                                         {"linear", pressure_rows.linear},
                                         {"plain", pressure_rows.plain},
                                         {"open", pressure_rows.open}};

@@ -96,7 +96,7 @@ private:
   // Far from walls the pressure's gradient, which is quadratic, serves the velocity too; next to
   // one its rows do not hold for a velocity.
   bool has_gradient_of_pressure(int i) const {
-    return problem_.row_kind[i] == RowKind::quadratic && !has_wall_row(i, cloud_);
+    return has_quadratic_gradient(problem_.row_kind[i]) && !has_wall_row(i, cloud_);
   }
 
   void set_source(int i) const {

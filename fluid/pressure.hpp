@@ -32,19 +32,29 @@ template <int dim> struct WallRow {
 /// How a row of the Laplacian was made.
 enum class RowKind : std::uint8_t {
   quadratic, // the quadratic fit
+  blended,   // sign guard: with as much of the next as its signs need
   linear,    // sign guard: renormalised (LDD) Laplacian instead
   plain,     // sign guard: positive weights without correction
   open,      // of an open point: no Laplacian
 };
 
+/// Is the gradient of the point that of the quadratic fit?
+constexpr bool has_quadratic_gradient(RowKind kind) {
+  return kind == RowKind::quadratic || kind == RowKind::blended;
+}
+
 /// Rows of each kind, for the run report.
 struct RowCounts {
-  int quadratic = 0, linear = 0, plain = 0, open = 0;
+  int quadratic = 0, blended = 0, linear = 0, plain = 0, open = 0;
+
+  int guarded() const { return blended + linear + plain; }
 
   int &of(RowKind kind) {
     switch (kind) {
     case RowKind::quadratic:
       return quadratic;
+    case RowKind::blended:
+      return blended;
     case RowKind::linear:
       return linear;
     case RowKind::plain:
@@ -71,8 +81,15 @@ template <int dim> struct PressureProblem {
   bool has_open_point = false; // else pressure is known up to a constant
 };
 
+/// Operators of the pressure where the cloud allows both.
+enum class PressureOperators : std::uint8_t {
+  quadratic,    // Laplacian and gradient of second order from quadratic fits
+  renormalised, // linear gradient and renormalised Laplacian: the method as published
+};
+
 struct PressureParams {
-  double density = 1000;      // [kg/m^3]
+  double density = 1000; // [kg/m^3]
+  PressureOperators operators = PressureOperators::quadratic;
   double row_guard = 0.1;     // largest ratio of negative to positive weights in a row
   double gradient_guard = 20; // largest norm of a gradient's functional, times the kernel radius
 };

@@ -118,6 +118,30 @@ Vec<dim> renormalising_skew(const Stencil<dim> &s, const Points<dim> &points,
   return fit.inverse() * offset;
 }
 
+/// Blends `row` with as much of `other`, whose signs pass the guard, as it takes to pass it too,
+/// to 1/64. With N and P the sums of negative and positive weights, N - guard P is convex in the
+/// share: it has one zero. Both rows are consistent, and so is what lies between. Derived here.
+template <int dim> void blend_until_signs_pass(const Row<dim> &other, double guard, Row<dim> &row) {
+  const auto blend = [](double share, double a, double b) { return (1 - share) * a + share * b; };
+  const auto passes = [&](double share) {
+    double negative = 0, positive = 0;
+    for (int k = 0; k < row.count; ++k) {
+      const double a = blend(share, row.neighbour[k], other.neighbour[k]);
+      (a < 0 ? negative : positive) += std::abs(a);
+    }
+    return negative <= guard * positive;
+  };
+  double too_little = 0, enough = 1;
+  while (enough - too_little > 1.0 / 64) {
+    const double middle = 0.5 * (too_little + enough);
+    (passes(middle) ? enough : too_little) = middle;
+  }
+  for (int k = 0; k < row.count; ++k)
+    row.neighbour[k] = blend(enough, row.neighbour[k], other.neighbour[k]);
+  for (std::size_t m = 0; m < row.wall.size(); ++m)
+    row.wall[m] = blend(enough, row.wall[m], other.wall[m]);
+}
+
 /// The fallback ladder: the first row whose signs keep the matrix definite.
 template <int dim>
 RowKind laplacian_row(const Stencil<dim> &s, const Points<dim> &points, const Cloud<dim> &cloud,
@@ -127,10 +151,16 @@ RowKind laplacian_row(const Stencil<dim> &s, const Points<dim> &points, const Cl
     if (!has_wrong_signs(row, guard))
       return RowKind::quadratic;
   }
-  row.wall = {};
-  renormalised_row(s, points, cloud, renormalising_skew(s, points, cloud), row);
-  if (!has_wrong_signs(row, guard))
-    return RowKind::linear;
+  Row<dim> linear;
+  linear.count = row.count;
+  renormalised_row(s, points, cloud, renormalising_skew(s, points, cloud), linear);
+  if (!has_wrong_signs(linear, guard)) {
+    if (fit)
+      blend_until_signs_pass(linear, guard, row);
+    else
+      row = linear;
+    return fit ? RowKind::blended : RowKind::linear;
+  }
   row.wall = {};
   renormalised_row<dim>(s, points, cloud, Vec<dim>::Zero(), row);
   return RowKind::plain;
@@ -195,7 +225,7 @@ public:
   /// Rows of the points first .. first + 7.
   void rows(int first) const {
     const PackedStencil<dim> s(first, points_, cloud_);
-    unsigned made = regular_points(s);
+    unsigned made = is_quadratic() ? regular_points(s) : 0;
     if (std::popcount(made) >= fewest_in_pack)
       made &= quadratic_rows(s);
     else
@@ -206,6 +236,8 @@ public:
   }
 
 private:
+  bool is_quadratic() const { return params_.operators == PressureOperators::quadratic; }
+
   // Below this a pack costs more than the points one by one.
   static constexpr int fewest_in_pack = 2;
 
@@ -286,10 +318,10 @@ private:
 
   RowKind poisson_row(const Stencil<dim> &s, Row<dim> &row) const {
     QuadraticFit<dim> fit = quadratic_fit(s, points_, cloud_);
-    const bool regular = fit.factorise() && set_quadratic_gradient(s, fit);
+    const bool regular = is_quadratic() && fit.factorise() && set_quadratic_gradient(s, fit);
     const RowKind kind =
         laplacian_row(s, points_, cloud_, regular ? &fit : nullptr, params_.row_guard, row);
-    if (kind != RowKind::quadratic)
+    if (!has_quadratic_gradient(kind))
       problem_.gradient[s.i] = linear_gradient(s, cloud_);
     const double share = 1 - cloud_.openness[s.i];
     for (double &w : row.wall)

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Generalised Newtonian fluids: the dynamic viscosity as a function of the shear rate
-// gamma = sqrt(2 E : E), E the strain rate. A law is one class with `operator()(gamma)`.
+// gamma = sqrt(2 E : E), E the strain rate. A law is one class with `operator()(gamma)`, and
+// `thins()`: where it changes most, its viscosity falls with the shear rate.
 #pragma once
 
 #include "bridge/base/config.hpp"
@@ -15,12 +16,14 @@ namespace sluice::fluid {
 struct Newtonian {
   double viscosity = 1e-3; // [Pa s]
   double operator()(double) const { return viscosity; }
+  bool thins() const { return false; }
 };
 
 /// k gamma^(n-1). Source: W. Ostwald, Kolloid-Z. 36 (1925) 99.
 struct PowerLaw {
   double consistency = 1e-3, exponent = 1; // [Pa s^n], [-]
   double operator()(double gamma) const { return consistency * std::pow(gamma, exponent - 1); }
+  bool thins() const { return exponent < 1; }
 };
 
 /// mu_inf + (mu_0 - mu_inf) (1 + (lambda gamma)^a)^((n-1)/a). Source: K. Yasuda, R. C. Armstrong,
@@ -32,6 +35,7 @@ struct CarreauYasuda {
     return at_infinity + (at_rest - at_infinity) * std::pow(1 + std::pow(time * gamma, sharpness),
                                                             (exponent - 1) / sharpness);
   }
+  bool thins() const { return (exponent < 1) == (at_rest > at_infinity); }
 };
 
 /// mu_inf + (mu_0 - mu_inf) / (1 + (lambda gamma)^m). Source: M. M. Cross, J. Colloid Sci. 20
@@ -42,6 +46,7 @@ struct Cross {
   double operator()(double gamma) const {
     return at_infinity + (at_rest - at_infinity) / (1 + std::pow(time * gamma, exponent));
   }
+  bool thins() const { return at_rest > at_infinity; }
 };
 
 /// k gamma^(n-1) + tau_y (1 - exp(-m gamma)) / gamma; n = 1 is Bingham's fluid. The yield stress is
@@ -54,6 +59,7 @@ struct HerschelBulkley {
     return consistency * std::pow(gamma, exponent - 1) -
            yield_stress * std::expm1(-growth * gamma) / gamma;
   }
+  bool thins() const { return yield_stress > 0 || exponent < 1; }
 };
 
 using ViscosityLaw = std::variant<Newtonian, PowerLaw, CarreauYasuda, Cross, HerschelBulkley>;
@@ -110,6 +116,9 @@ public:
   /// Slope d ln(mu gamma) / d ln gamma where the law is that of a power: above 1 the fluid
   /// thickens. 1 for laws that have no such range, or one below a yield stress.
   double exponent() const;
+  bool thins() const {
+    return std::visit([](const auto &law) { return law.thins(); }, law_);
+  }
   const RheologyParams &params() const { return params_; }
 
   /// Calls body(viscosity) with a function of the shear rate [1/s] that returns [Pa s]: the choice

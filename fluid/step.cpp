@@ -16,6 +16,8 @@ template <int dim>
 FluidSolver<dim>::FluidSolver(const Scene<dim> &scene)
     : state(scene.initial), walls(scene.walls), params_(scene.params) {
   pressure_params_.density = params_.density;
+  if (params_.pressure_rows == "renormalised")
+    pressure_params_.operators = PressureOperators::renormalised;
   pressure_params_.row_guard = params_.row_guard;
   pressure_params_.gradient_guard = params_.gradient_guard;
   if (!params_.rheology.is_newtonian()) // a hundredth of what ends the passes over the law

@@ -137,8 +137,18 @@ void set_wall_viscosity(const Points<dim> &points, const Cloud<dim> &cloud,
 
 // --- rows -----------------------------------------------------------------------------------
 
+/// Viscosity between two points, that of the law at their mean shear rate: exactly so for a yield
+/// stress, where 1 / mu is proportional to the shear rate, and for a power law of exponent 2, where
+/// mu is. The arithmetic mean would stiffen what lies next to a plug. Derived here.
+struct HarmonicMean {
+  double operator()(double a, double b) const { return 2 * a * b / (a + b); }
+};
+struct ArithmeticMean {
+  double operator()(double a, double b) const { return 0.5 * (a + b); }
+};
+
 /// The force per volume on one point, as a sum of blocks times velocity differences.
-template <int dim> class ViscousForce {
+template <int dim, class Mean> class ViscousForce {
 public:
   ViscousForce(const Walls<dim> &walls, const Cloud<dim> &cloud, const ViscousProblem<dim> &problem,
                bool is_uniform)
@@ -164,7 +174,7 @@ public:
     const Vec<dim> slope = is_open || is_uniform_ ? Vec<dim>(Vec<dim>::Zero()) : viscosity_slope(i);
     for (std::size_t k = 0; k < neighbours.size(); ++k) {
       const int j = neighbours[k];
-      const double mean = 0.5 * (mu + problem_.viscosity[j]);
+      const double mean = Mean{}(mu, problem_.viscosity[j]);
       if (form == ViscousRowForm::blocks)
         visit(j, Mat<dim>(mean * problem_.rows.block[start + k] +
                           outer(problem_.rows.gradient[start + k], slope)));
@@ -222,8 +232,8 @@ PackVec<dim> pressures_sums(const PackedStencil<dim> &s, const SlicedMatrix &mat
 }
 
 // Rows of the pressure's matrix eight at a time, the others one by one.
-template <int dim>
-void apply_explicitly(const ViscousForce<dim> &force, const Points<dim> &points,
+template <int dim, class Mean>
+void apply_explicitly(const ViscousForce<dim, Mean> &force, const Points<dim> &points,
                       const Cloud<dim> &cloud, double factor, VecSpan<dim> velocity,
                       ViscousProblem<dim> &problem) {
   const ViscousRows<dim> &rows = problem.rows;
@@ -282,8 +292,8 @@ template <int dim> void lay_out(const Cloud<dim> &cloud, ViscousProblem<dim> &pr
   });
 }
 
-template <int dim>
-void fill(const ViscousForce<dim> &force, const Cloud<dim> &cloud, double factor,
+template <int dim, class Mean>
+void fill(const ViscousForce<dim, Mean> &force, const Cloud<dim> &cloud, double factor,
           VecView<dim> velocity, ViscousProblem<dim> &problem) {
   const int n = static_cast<int>(cloud.kind.size());
   SparseMatrix &matrix = problem.matrix;
@@ -436,14 +446,16 @@ template <int dim> double shear_rate(const Mat<dim> &gradient) {
   return (gradient + gradient.transpose()).norm() / std::sqrt(2.0);
 }
 
-template <int dim>
-ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &walls,
-                               const Cloud<dim> &cloud, const Rheology &rheology, double density,
-                               double dt, VecView<dim> expected, VecSpan<dim> velocity,
-                               ViscousProblem<dim> &problem) {
+namespace {
+
+template <class Mean, int dim>
+ViscousResult diffuse_with(const Points<dim> &points, const Walls<dim> &walls,
+                           const Cloud<dim> &cloud, const Rheology &rheology, double density,
+                           double dt, VecView<dim> expected, VecSpan<dim> velocity,
+                           ViscousProblem<dim> &problem) {
   const int n = points.size();
   const double factor = dt / density, spacing2 = cloud.spacing * cloud.spacing;
-  const ViscousForce<dim> force(walls, cloud, problem, rheology.is_newtonian());
+  const ViscousForce<dim, Mean> force(walls, cloud, problem, rheology.is_newtonian());
   const auto update_viscosity = [&](VecView<dim> u, double relaxation) {
     if (rheology.is_newtonian()) {
       set_uniform_viscosity(rheology, n, problem);
@@ -488,6 +500,18 @@ ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &wall
   }
   std::copy(latest.begin(), latest.end(), velocity.begin());
   return result;
+}
+
+} // namespace
+
+template <int dim>
+ViscousResult diffuse_velocity(const Points<dim> &points, const Walls<dim> &walls,
+                               const Cloud<dim> &cloud, const Rheology &rheology, double density,
+                               double dt, VecView<dim> expected, VecSpan<dim> velocity,
+                               ViscousProblem<dim> &problem) {
+  const auto diffuse =
+      rheology.thins() ? diffuse_with<HarmonicMean, dim> : diffuse_with<ArithmeticMean, dim>;
+  return diffuse(points, walls, cloud, rheology, density, dt, expected, velocity, problem);
 }
 
 template double shear_rate(const Mat<2> &);

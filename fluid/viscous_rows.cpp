@@ -59,7 +59,7 @@ template <int dim>
 bool is_like_pressures(int i, const Cloud<dim> &cloud, const PressureProblem<dim> &pressure) {
   const PointWalls<dim> *walls = cloud.walls_of(i);
   return cloud.openness[i] == 0 && (!walls || walls->count == 0) &&
-         pressure.row_kind[i] == RowKind::quadratic;
+         has_quadratic_gradient(pressure.row_kind[i]);
 }
 
 /// Builds the rows of one point, with or without those of the gradient.

@@ -80,7 +80,7 @@ TEST(Step, WaterAtRestBehindAThinRigidGateStaysAtRest) {
 // from step to step.
 constexpr const char *vortex = R"toml(
 [fluid]
-spacing_m = 0.05
+spacing_m = 0.025
 density_kg_m3 = 1
 dynamic_viscosity_pa_s = 0.01
 gravity_m_s2 = [0, 0]
