@@ -41,8 +41,23 @@ template <int dim> void FluidSolver<dim>::begin_step(double dt) {
     assemble_pressure_operators(state.points, cloud_, pressure_params_, problem_);
     report_.rows = problem_.rows;
   });
+  if (state.step == 0 && viscosity_knows_pressure())
+    find_first_pressure();
   timer("viscosity", [&] { predict_velocity(); });
   assemble();
+}
+
+// Where viscosity has to know the last pressure there is none in the first step: without it a stiff
+// fluid at rest gets the whole weight of a step, and what the projection leaves of that.
+template <int dim> void FluidSolver<dim>::find_first_pressure() {
+  constexpr int passes = 3;
+  Points<dim> &points = state.points;
+  for (int k = 0; k < passes; ++k) {
+    timer("viscosity", [&] { predict_velocity(); });
+    assemble();
+    iterate();
+    pressure_gradients(points, cloud_, problem_, points.pressure, points.pressure_gradient);
+  }
 }
 
 template <int dim> void FluidSolver<dim>::iterate() {
@@ -229,14 +244,19 @@ template <int dim> void FluidSolver<dim>::extrapolate_velocity() {
   });
 }
 
+template <int dim> bool FluidSolver<dim>::viscosity_knows_pressure() const {
+  return !params_.rheology.is_inviscid() &&
+         (params_.time_order == 2 ||
+          !is_explicit(params_.rheology, params_.density, dt_, params_.spacing));
+}
+
 // Velocity that gravity and the last pressure add in the step: what viscosity has to know, so that
 // water at rest stays so and a surface point does not fall freely before it is held. In a step of
 // first order without stiffness it makes a difference of second order, and is left out.
 template <int dim> void FluidSolver<dim>::push_by_known_forces() {
   const Points<dim> &points = state.points;
   push_.assign(points.size(), Vec<dim>::Zero());
-  if (params_.time_order == 1 &&
-      is_explicit(params_.rheology, params_.density, projection_dt_, params_.spacing))
+  if (!viscosity_knows_pressure())
     return;
   carried_pressure_gradients(points, cloud_, problem_, push_);
   for_each_point(points.size(), [&](int i) {

@@ -87,6 +87,8 @@ private:
   void extrapolate_velocity();
   void push_by_known_forces();
   bool viscosity_is_negligible() const;
+  bool viscosity_knows_pressure() const;
+  void find_first_pressure();
   void predict_velocity();
   bool keeps_stiff_pressure() const;
   void take_back_push();
