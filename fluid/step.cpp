@@ -50,7 +50,7 @@ template <int dim> void FluidSolver<dim>::begin_step(double dt) {
 // Where viscosity has to know the last pressure there is none in the first step: without it a stiff
 // fluid at rest gets the whole weight of a step, and what the projection leaves of that.
 template <int dim> void FluidSolver<dim>::find_first_pressure() {
-  constexpr int passes = 3;
+  constexpr int passes = 2; // more do not settle: each differentiates the last pressure anew
   Points<dim> &points = state.points;
   for (int k = 0; k < passes; ++k) {
     timer("viscosity", [&] { predict_velocity(); });
