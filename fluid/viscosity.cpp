@@ -197,16 +197,20 @@ private:
   Vec<dim> viscosity_slope(int i) const {
     const auto neighbours = cloud_.neighbours.of(i);
     const int start = problem_.rows.start[i];
+    const double mu = problem_.viscosity[i];
+    double least = mu;
     Vec<dim> slope = Vec<dim>::Zero();
-    for (std::size_t k = 0; k < neighbours.size(); ++k)
-      slope += (problem_.viscosity[neighbours[k]] - problem_.viscosity[i]) *
-               problem_.rows.gradient[start + k];
+    for (std::size_t k = 0; k < neighbours.size(); ++k) {
+      const double mu_j = problem_.viscosity[neighbours[k]];
+      slope += (mu_j - mu) * problem_.rows.gradient[start + k];
+      least = std::min(least, Mean{}(mu, mu_j));
+    }
     for_each_wall(i, cloud_, [&](int m, const Projection<dim> &) {
       const ViscousWallWeight<dim> &w = problem_.rows.wall_weights[cloud_.wall_slot[i]][m];
       slope += 2 * (w.viscosity - problem_.viscosity[i]) * w.gradient;
     });
     // What changes faster the points do not resolve, and the rows would lose their signs.
-    const double steepest = 0.5 * problem_.viscosity[i] / cloud_.spacing, length = slope.norm();
+    const double steepest = 0.5 * least / cloud_.spacing, length = slope.norm();
     return length > steepest ? Vec<dim>(steepest / length * slope) : slope;
   }
 
