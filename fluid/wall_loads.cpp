@@ -99,9 +99,13 @@ private:
     const PointWalls<dim> *near = cloud_.walls_of(i);
     if (!near || near->count == 0)
       return false;
-    const auto candidates = cloud_.near_faces.near(cloud_.grid.cell(points_.position[i]));
     const double off_wall = 1e-6 * cloud_.spacing;
-    return is_hidden<dim>(walls_, candidates, x + off_wall * inward, points_.position[i]);
+    const Vec<dim> from = x + off_wall * inward, &to = points_.position[i];
+    // no wall enters the ball around the point up to its nearest one
+    const double clear = (1 - 1e-9) * std::abs(near->projection[0].distance) / (to - from).norm();
+    const Vec<dim> end = to + std::min(clear, 1.0) * (from - to);
+    return cloud_.face_tree.any_along(
+        from, end, [&](int f) { return is_crossed(walls_.corners(walls_.faces[f]), from, to); });
   }
 
   template <class Visit> void for_each_point_near(const Vec<dim> &x, Visit &&visit) const {
