@@ -13,7 +13,7 @@ namespace sluice::fluid {
 namespace {
 
 // Faces of a node without descendants.
-constexpr int most_together = 2;
+constexpr int most_together = 1;
 // Boxes are wider by this part of the largest coordinate, cones by this angle [rad]: more than
 // rounding moves a foot.
 constexpr double box_margin = 1e-12, angle_margin = 1e-5;
