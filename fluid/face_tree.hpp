@@ -123,9 +123,12 @@ private:
 /// Separating axes: those of the box, and those across one of them and the line. Source: C.
 /// Ericson, Real-Time Collision Detection (2005), section 5.3.3.
 template <int dim> inline bool FaceTree<dim>::Node::meets(const Line &line) const {
-  const Vec<dim> c = line.middle - centre;
-  if ((c.cwiseAbs().array() > (half + line.extent).array()).any())
-    return false;
+  Vec<dim> c;
+  for (int d = 0; d < dim; ++d) { // most boxes are apart along the first directions
+    c[d] = line.middle[d] - centre[d];
+    if (std::abs(c[d]) > half[d] + line.extent[d])
+      return false;
+  }
   const auto is_apart = [&](int a, int b) {
     return std::abs(line.half[a] * c[b] - line.half[b] * c[a]) >
            half[a] * line.extent[b] + half[b] * line.extent[a];
