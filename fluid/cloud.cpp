@@ -43,12 +43,14 @@ template <int dim> Vec<dim> open_side(const VoronoiCell<dim> &cell, double limit
 
 template <int dim>
 void find_walls(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &cloud) {
-  find_near_faces(walls, cloud.grid, cloud.radius, cloud.near_faces);
+  cloud.face_tree.update(walls);
+  const double near = cloud.radius + cloud.grid.half_diagonal();
   const int n = points.size();
   cloud.wall_slot.assign(n, -1);
   cloud.wall_points.clear();
   for (int c = 0; c < cloud.grid.n_cells(); ++c)
-    if (!cloud.near_faces.near(c).empty())
+    if (cloud.ranges.start[c] < cloud.ranges.start[c + 1] &&
+        is_near_walls(walls, cloud.face_tree, cloud.grid.centre(c), near))
       for (int i = cloud.ranges.start[c]; i < cloud.ranges.start[c + 1]; ++i) {
         cloud.wall_slot[i] = static_cast<int>(cloud.wall_points.size());
         cloud.wall_points.push_back(i);
@@ -56,8 +58,7 @@ void find_walls(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &
   cloud.point_walls.resize(cloud.wall_points.size());
   for_each_index(static_cast<int>(cloud.wall_points.size()), [&](int k) {
     const Vec<dim> &x = points.position[cloud.wall_points[k]];
-    const auto candidates = cloud.near_faces.near(cloud.grid.cell(x));
-    cloud.point_walls[k] = project_on_walls(walls, candidates, x, cloud.radius);
+    cloud.point_walls[k] = project_on_walls(walls, cloud.face_tree, x, cloud.radius);
   });
 }
 
@@ -68,26 +69,30 @@ template <int dim> double distance_to_nearest_wall(const Cloud<dim> &cloud, int 
                                               : cloud.radius;
 }
 
-// No wall enters the balls around two points up to their nearest walls: where they overlap they hold
-// the line between the points.
+// No wall enters the balls around two points up to their nearest walls: where they overlap they
+// hold the line between the points, and else a wall may cross it between them only.
 template <int dim>
-bool certainly_in_sight(const Points<dim> &points, const Cloud<dim> &cloud, int i, int j) {
+bool is_hidden(const Points<dim> &points, const Walls<dim> &walls, const Cloud<dim> &cloud, int i,
+               int j) {
   constexpr double rounding = 1e-9;
-  const double clear = distance_to_nearest_wall(cloud, i) + distance_to_nearest_wall(cloud, j);
-  return (1 - rounding) * clear * clear > (points.position[j] - points.position[i]).squaredNorm();
+  const double at_i = distance_to_nearest_wall(cloud, i), at_j = distance_to_nearest_wall(cloud, j);
+  const Vec<dim> &from = points.position[i], &to = points.position[j], path = to - from;
+  const double clear = at_i + at_j, length2 = path.squaredNorm();
+  if ((1 - rounding) * clear * clear > length2)
+    return false;
+  const double part = (1 - rounding) / std::sqrt(length2);
+  return cloud.face_tree.any_along(from + part * at_i * path, to - part * at_j * path, [&](int f) {
+    return is_crossed(walls.corners(walls.faces[f]), from, to);
+  });
 }
 
 template <int dim>
 void drop_hidden_neighbours(const Points<dim> &points, const Walls<dim> &walls, Cloud<dim> &cloud) {
   for_each_index(static_cast<int>(cloud.wall_points.size()), [&](int k) {
     const int i = cloud.wall_points[k];
-    const Vec<dim> &x = points.position[i];
-    const auto candidates = cloud.near_faces.near(cloud.grid.cell(x));
     int *const first = cloud.neighbours.first(i);
-    int *const last = std::remove_if(first, first + cloud.neighbours.count[i], [&](int j) {
-      return !certainly_in_sight(points, cloud, i, j) &&
-             is_hidden(walls, candidates, x, points.position[j]);
-    });
+    int *const last = std::remove_if(first, first + cloud.neighbours.count[i],
+                                     [&](int j) { return is_hidden(points, walls, cloud, i, j); });
     cloud.neighbours.count[i] = static_cast<int>(last - first);
   });
 }

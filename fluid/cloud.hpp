@@ -38,9 +38,9 @@ template <int dim> struct Cloud {
   bool has_air = true; // false: the fluid fills its container, holes are no surface
   Grid<dim> grid;
   CellRanges ranges;
-  NeighbourLists neighbours; // those in sight
-  SlicedPattern slices;      // the same lists side by side
-  FaceGrid near_faces;
+  NeighbourLists neighbours;                // those in sight
+  SlicedPattern slices;                     // the same lists side by side
+  FaceTree<dim> face_tree;                  // of the walls
   std::vector<int> wall_slot;               // per point: index into point_walls, or -1
   std::vector<int> wall_points;             // per slot: the point
   std::vector<PointWalls<dim>> point_walls; // projections within the kernel radius

@@ -163,7 +163,7 @@ template <int dim> class Flood {
 public:
   Flood(const FluidParams<dim> &params, const Walls<dim> &walls)
       : params_(params), walls_(walls), grid_(grid_over_walls()) {
-    find_near_faces(walls_, grid_, params_.spacing, near_);
+    tree_.update(walls_);
   }
 
   std::vector<Vec<dim>> points() const {
@@ -232,26 +232,22 @@ private:
     return x;
   }
 
-  std::span<const int> faces_near(const Place &at) const {
-    return near_.near(grid_.cell(centre(at)));
-  }
-
   bool is_free(const Place &at) const {
     const Vec<dim> x = centre(at);
     if (x[1] > params_.fill_level)
       return false;
-    const auto walls = project_on_walls(walls_, faces_near(at), x, params_.spacing);
+    const auto walls = project_on_walls(walls_, tree_, x, params_.spacing);
     return std::all_of(walls.begin(), walls.end(),
                        [&](const Projection<dim> &p) { return p.distance >= clearance(); });
   }
 
   bool is_crossing(const Place &from, const Place &to) const {
-    return is_hidden(walls_, faces_near(from), centre(from), centre(to));
+    return is_hidden(walls_, tree_, centre(from), centre(to));
   }
 
   void check_in_front(const Place &at) const {
     const Vec<dim> x = centre(at);
-    for (const Projection<dim> &p : project_on_walls(walls_, faces_near(at), x, params_.spacing))
+    for (const Projection<dim> &p : project_on_walls(walls_, tree_, x, params_.spacing))
       check(p.distance >= 0,
             "the fluid from fill_from_m lies behind wall '{}' at {} m; turn the wall round: its "
             "fluid "
@@ -261,7 +257,8 @@ private:
 
   void check_border(const Place &at) const {
     for (int d = 0; d < dim; ++d)
-      if ((at[d] == 0 || at[d] == grid_.size[d] - 1) && faces_near(at).empty())
+      if ((at[d] == 0 || at[d] == grid_.size[d] - 1) &&
+          !is_near_walls(walls_, tree_, centre(at), params_.spacing + grid_.half_diagonal()))
         fail("the fluid runs out of the scene at {} m, where no wall is within {} m; close the "
              "walls below fill_level_m = {} m",
              text_of(centre(at)), params_.spacing, params_.fill_level);
@@ -270,26 +267,24 @@ private:
   const FluidParams<dim> &params_;
   const Walls<dim> &walls_;
   Grid<dim> grid_;
-  FaceGrid near_;
+  FaceTree<dim> tree_;
 };
 
 // --- start ------------------------------------------------------------------------------------
 
 // Random displacements of every coordinate by up to `amplitude` [m]; next to a wall by up to half
 // of what keeps the point off it.
-template <int dim>
-void disturb(double amplitude, double spacing, const Walls<dim> &walls, Points<dim> &points) {
+template <int dim> void disturb(double amplitude, const Walls<dim> &walls, Points<dim> &points) {
   std::mt19937_64 random(1); // always the same points
   const auto between = [&] { // -1 and 1, the same on every platform
     return static_cast<double>(random() >> 11) * 0x1p-52 - 1;
   };
   const double reach = 4 * amplitude;
-  const Grid<dim> grid = grid_over(points, std::max(reach, spacing));
-  FaceGrid near;
-  find_near_faces(walls, grid, reach, near);
+  FaceTree<dim> tree;
+  tree.update(walls);
   for (Vec<dim> &x : points.position) {
     double largest = amplitude;
-    for (const Projection<dim> &p : project_on_walls(walls, near.near(grid.cell(x)), x, reach))
+    for (const Projection<dim> &p : project_on_walls(walls, tree, x, reach))
       largest = std::min(largest, 0.5 * std::max(p.distance, 0.0) / std::sqrt(double{dim}));
     for (double &coordinate : x)
       coordinate += largest * between();
@@ -308,7 +303,7 @@ template <int dim> Points<dim> fill(const FluidParams<dim> &params, const Walls<
   points.position =
       params.is_flooded() ? Flood<dim>(params, walls).points() : points_in_outline(params);
   if (params.start_jitter > 0)
-    disturb(params.start_jitter * params.spacing, params.spacing, walls, points);
+    disturb(params.start_jitter * params.spacing, walls, points);
   const std::size_t n = points.position.size();
   const Formula<dim> start_velocity(params.start_velocity);
   for (const Vec<dim> &x : points.position)

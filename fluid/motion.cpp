@@ -40,12 +40,11 @@ struct Contact {
 
 template <int dim>
 Contact resolve_contact(Vec<dim> &x, Vec<dim> &u, const Walls<dim> &walls,
-                        std::span<const int> candidates, double reach, double clearance,
-                        bool is_held) {
+                        const FaceTree<dim> &tree, double reach, double clearance, bool is_held) {
   Contact contact;
   constexpr int sweeps = 4;
   for (int sweep = 0; sweep < sweeps; ++sweep) {
-    const PointWalls<dim> near = project_on_walls(walls, candidates, x, reach);
+    const PointWalls<dim> near = project_on_walls(walls, tree, x, reach);
     const double limit = clearance_between(near, clearance);
     bool touched = false;
     for (const Projection<dim> &p : near) {
@@ -81,10 +80,9 @@ ContactCounts<dim> keep_clear_of_walls(Points<dim> &points, const Walls<dim> &wa
           if (near.count == 0 || near.projection[0].distance >= clearance * (1 - 1e-9))
             continue;
           const int i = cloud.wall_points[k];
-          const auto candidates = cloud.near_faces.near(cloud.grid.cell(points.position[i]));
           const Vec<dim> before = points.velocity[i];
           const Contact contact = resolve_contact(points.position[i], points.velocity[i], walls,
-                                                  candidates, cloud.radius, clearance,
+                                                  cloud.face_tree, cloud.radius, clearance,
                                                   points.at_surface[i] == SurfaceMemory::enclosed);
           const Vec<dim> change = points.velocity[i] - before;
           part[0] += contact.moved;

@@ -25,6 +25,10 @@ template <int dim> Vec<dim> Grid<dim>::top() const {
   return origin + cell_size * cells;
 }
 
+template <int dim> double Grid<dim>::half_diagonal() const {
+  return 0.5 * std::sqrt(double{dim}) * cell_size;
+}
+
 template <int dim> int Grid<dim>::number(double coordinate, int d) const {
   return static_cast<int>(std::clamp((coordinate - origin[d]) / cell_size, 0.0, size[d] - 1.0));
 }

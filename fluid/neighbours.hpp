@@ -30,6 +30,7 @@ template <int dim> struct Grid {
   int cell(const Place &place) const;
   int cell(const Vec<dim> &x) const { return cell(place(x)); }
   Vec<dim> centre(int cell) const; ///< [m]
+  double half_diagonal() const;    ///< of a cell [m]
 
   /// Calls visit(first, last) for the cells of the box from `low` to `high` [m], both clamped: runs
   /// of cells first .. last along the first direction.

@@ -61,11 +61,10 @@ void for_each_point_near(const Cloud<dim> &cloud, const Vec<dim> &x, Visit &&vis
 // A place on a wall is moved into the fluid by a millionth of a spacing: from the wall itself
 // nothing is in sight.
 template <int dim>
-Vec<dim> off_the_wall(const Walls<dim> &walls, std::span<const int> near_walls,
-                      const Vec<dim> &place, const Cloud<dim> &cloud) {
+Vec<dim> off_the_wall(const Walls<dim> &walls, const Vec<dim> &place, const Cloud<dim> &cloud) {
   const double least = 1e-6 * cloud.spacing;
   Vec<dim> moved = place;
-  for (const Projection<dim> &p : project_on_walls(walls, near_walls, place, cloud.radius))
+  for (const Projection<dim> &p : project_on_walls(walls, cloud.face_tree, place, cloud.radius))
     if (std::abs(p.distance) < least)
       moved -= least * p.normal;
   return moved;
@@ -76,18 +75,18 @@ Vec<dim> off_the_wall(const Walls<dim> &walls, std::span<const int> near_walls,
 template <int dim> Reading<dim> read_at(const FluidSolver<dim> &solver, const Vec<dim> &wanted) {
   const Cloud<dim> &cloud = solver.cloud();
   const Points<dim> &points = solver.state.points;
-  const auto near_walls = cloud.near_faces.near(cloud.grid.cell(wanted));
-  const Vec<dim> place = off_the_wall(solver.walls, near_walls, wanted, cloud);
+  const Vec<dim> place = off_the_wall(solver.walls, wanted, cloud);
   ValueFit<dim, dim> velocity;
   ValueFit<dim, 1> pressure;
   for_each_point_near(cloud, place, [&](int i) {
     const Vec<dim> q = (points.position[i] - place) / cloud.radius;
-    if (q.squaredNorm() >= 1 || is_hidden(solver.walls, near_walls, place, points.position[i]))
+    if (q.squaredNorm() >= 1 || is_hidden(solver.walls, cloud.face_tree, place, points.position[i]))
       return;
     velocity.add(q, points.velocity[i].transpose());
     pressure.add(q, Eigen::Matrix<double, 1, 1>(points.pressure[i]));
   });
-  for (const Projection<dim> &p : project_on_walls(solver.walls, near_walls, place, cloud.radius))
+  for (const Projection<dim> &p :
+       project_on_walls(solver.walls, cloud.face_tree, place, cloud.radius))
     velocity.add((p.point - place) / cloud.radius, wall_velocity(solver.walls, p).transpose());
   return {velocity.value().transpose(), pressure.value()[0]};
 }

@@ -20,12 +20,10 @@ template <int dim> double volume_error(const Scene<dim> &scene) {
 template <int dim> void check_clear_of_walls(const Scene<dim> &scene, double tolerance) {
   const double spacing = scene.params.spacing;
   const auto &position = scene.initial.points.position;
-  const Grid<dim> grid = grid_over(scene.initial.points, 4 * spacing);
-  FaceGrid near;
-  find_near_faces(scene.walls, grid, spacing, near);
+  FaceTree<dim> tree;
+  tree.update(scene.walls);
   for (const Vec<dim> &x : position)
-    for (const Projection<dim> &p :
-         project_on_walls(scene.walls, near.near(grid.cell(x)), x, spacing))
+    for (const Projection<dim> &p : project_on_walls(scene.walls, tree, x, spacing))
       check(p.distance > -tolerance,
             "the water overlaps wall '{}': a point at {} m lies {:.3g} m behind it; "
             "correct water_m or the wall (the fluid lies on the left of its points_m)",

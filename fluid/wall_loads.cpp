@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <unordered_map>
 
 namespace sluice::fluid {
 
@@ -16,6 +17,18 @@ namespace {
 constexpr double load_radius = 2.0;
 // It is wet when a point is nearer than the first, dry beyond the second, in between in part.
 constexpr double wet_distance = 1.0, dry_distance = 1.5;
+
+// Faces narrower than this share averages with others in a cube of that edge, in spacings, where
+// the cosine of the angle between their normals is not smaller.
+constexpr double narrow = 0.25, shared_edge = 0.5, cos_widest_turn = 0.866;
+
+// The smallest height of a triangle.
+double width_of(const Corners<2> &c) { return face_measure(c); }
+double width_of(const Corners<3> &c) {
+  const double longest =
+      std::max({(c[1] - c[0]).norm(), (c[2] - c[1]).norm(), (c[0] - c[2]).norm()});
+  return 2 * face_measure(c) / longest;
+}
 
 double wet_fraction(double nearest, double spacing) {
   return std::clamp((dry_distance - nearest / spacing) / (dry_distance - wet_distance), 0.0, 1.0);
@@ -36,7 +49,94 @@ public:
         [&](const Corners<dim> &part) { return is_near_points(part); });
   }
 
+  // For sums over all walls; the loads on coupled ones are those that the partner gets.
+  void add_every_face() {
+    std::vector<char> is_coupled(walls_.names.size(), 0);
+    for (const int k : walls_.coupled_faces)
+      is_coupled[walls_.faces[k].wall] = 1;
+    for (int k = 0; k < static_cast<int>(walls_.faces.size()); ++k) {
+      const WallFace<dim> &f = walls_.faces[k];
+      if (is_coupled[f.wall] == 0 && width_of(walls_.corners(f)) < narrow * cloud_.spacing)
+        add_narrow_face(k);
+      else
+        add_face(k);
+    }
+  }
+
 private:
+  // One point on each piece, in the middle of the `dim` points that the rule has there.
+  void add_narrow_face(int k) {
+    Shape<dim> sum{};
+    int points = 0;
+    for_each_quadrature_point(
+        walls_.corners(walls_.faces[k]), cloud_.spacing,
+        [&](const Shape<dim> &shape, double measure) {
+          for (int c = 0; c < dim; ++c)
+            sum[c] += shape[c] / dim;
+          if (++points % dim > 0)
+            return;
+          add_sharing_sample(k, sum, dim * measure);
+          sum = {};
+        },
+        [&](const Corners<dim> &part) { return is_near_points(part); });
+  }
+
+  void add_sharing_sample(int k, const Shape<dim> &shape, double measure) {
+    const WallFace<dim> &face = walls_.faces[k];
+    const Vec<dim> x = value_at<dim>(walls_.position, face, shape);
+    const Vec<dim> inward = walls_.normal(face);
+    const Average &average = average_around(x, inward, face.wall);
+    const auto begin = quadrature_.contributions.begin() + average.first;
+    const auto distance2 = [&](const auto &c) {
+      return (points_.position[c.feeder] - x).squaredNorm();
+    };
+    const auto nearest =
+        std::min_element(begin, begin + average.count,
+                         [&](const auto &a, const auto &b) { return distance2(a) < distance2(b); });
+    if (average.count == 0)
+      return;
+    const double wet = wet_fraction(std::sqrt(distance2(*nearest)), cloud_.spacing);
+    if (wet > 0 && is_behind_another_wall(x, inward, nearest->feeder))
+      add_sample(k, shape, measure); // a sheet in front of it hides what the others see
+    else if (wet > 0)
+      quadrature_.samples.push_back(
+          {k, shape, x, Vec<dim>(-inward), wet * measure, average.first, average.count});
+  }
+
+  /// Contributions that samples share.
+  struct Average {
+    Vec<dim> inward;
+    int wall;
+    int first, count; // none: nothing was in sight
+    int next;         // of the same cube, -1: the last
+  };
+
+  // The average of the cube that holds x, collected there unless it is known.
+  const Average &average_around(const Vec<dim> &x, const Vec<dim> &inward, int wall) {
+    std::uint64_t cube = 0;
+    for (int d = 0; d < dim; ++d) {
+      const auto number = std::lround(x[d] / (shared_edge * cloud_.spacing));
+      cube = cube << 21 | (static_cast<std::uint64_t>(number) & 0x1fffff);
+    }
+    int &head = first_average_.try_emplace(cube, -1).first->second;
+    int k = head;
+    while (k >= 0 &&
+           (averages_[k].wall != wall || averages_[k].inward.dot(inward) < cos_widest_turn))
+      k = averages_[k].next;
+    if (k < 0) {
+      averages_.push_back({inward, wall, 0, 0, head});
+      k = head = static_cast<int>(averages_.size()) - 1;
+    }
+    Average &average = averages_[k];
+    if (average.count == 0) {
+      average.first = static_cast<int>(quadrature_.contributions.size());
+      collect(x, inward);
+      average.count = static_cast<int>(quadrature_.contributions.size()) - average.first;
+      normalise(average.first);
+    }
+    return average;
+  }
+
   // False where no cell of the grid near a part of a face holds a point: most of a dry channel goes
   // in large parts. Where many cells are near nothing is said yet, the part will be halved.
   bool is_near_points(const Corners<dim> &part) const {
@@ -99,9 +199,13 @@ private:
     const PointWalls<dim> *near = cloud_.walls_of(i);
     if (!near || near->count == 0)
       return false;
-    const auto candidates = cloud_.near_faces.near(cloud_.grid.cell(points_.position[i]));
     const double off_wall = 1e-6 * cloud_.spacing;
-    return is_hidden<dim>(walls_, candidates, x + off_wall * inward, points_.position[i]);
+    const Vec<dim> from = x + off_wall * inward, &to = points_.position[i];
+    // no wall enters the ball around the point up to its nearest one
+    const double clear = (1 - 1e-9) * std::abs(near->projection[0].distance) / (to - from).norm();
+    const Vec<dim> end = to + std::min(clear, 1.0) * (from - to);
+    return cloud_.face_tree.any_along(
+        from, end, [&](int f) { return is_crossed(walls_.corners(walls_.faces[f]), from, to); });
   }
 
   template <class Visit> void for_each_point_near(const Vec<dim> &x, Visit &&visit) const {
@@ -128,11 +232,9 @@ private:
   const Walls<dim> &walls_;
   const Cloud<dim> &cloud_;
   WallQuadrature<dim> &quadrature_;
+  std::vector<Average> averages_;
+  std::unordered_map<std::uint64_t, int> first_average_; // by cube
 };
-
-} // namespace
-
-namespace {
 
 // From point numbers to feeder numbers.
 template <int dim> void number_feeders(int n_points, WallQuadrature<dim> &quadrature) {
@@ -161,8 +263,7 @@ void build_wall_quadrature(const Points<dim> &points, const Walls<dim> &walls,
     for (const int k : walls.coupled_faces)
       builder.add_face(k);
   else
-    for (int k = 0; k < static_cast<int>(walls.faces.size()); ++k)
-      builder.add_face(k);
+    builder.add_every_face();
   number_feeders(points.size(), quadrature);
 }
 

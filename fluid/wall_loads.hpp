@@ -3,6 +3,13 @@
 // face the pressure is a positive average of first-order Taylor expansions from the points in
 // sight on the wetted side, p(x) = sum w_i (p_i + grad p_i . (x - x_i)): exact for linear pressure,
 // and affine in the wall velocity. Faces are one-sided; nothing is averaged round a corner.
+//
+// Where only the sum over all walls is asked for, narrow faces (less than a quarter of a spacing)
+// have one quadrature point on pieces no longer than a spacing, and those in one small cube share
+// their average: the points in sight of the first and their weights there. It is still linear in x
+// for each of them, so the sum is exact for linear pressure. Else the remainder of a Taylor
+// expansion, |grad grad p| r^2 / 2 from points up to r = 2 spacings away, becomes one up to the
+// cube's diagonal farther, 2.9 spacings: of the same order.
 #pragma once
 
 #include "fluid/cloud.hpp"
@@ -20,7 +27,7 @@ template <int dim> struct WallQuadrature {
     Vec<dim> position; // [m]
     Vec<dim> normal;   // unit, out of the fluid
     double measure;    // quadrature weight times wetted fraction [m^(dim-1)]
-    int first, count;  // contributions
+    int first, count;  // contributions; samples may share them
   };
   struct Contribution {
     int feeder;

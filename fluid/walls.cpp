@@ -150,16 +150,21 @@ Projection<dim> make_projection(const Walls<dim> &walls, int face, const Foot<di
           is_sharp(walls, face, foot.part)};
 }
 
-// Candidates of one point, nearest first: their order on the outlines has no influence.
+// Candidates of one point, nearest first, of two as far away the one of the first face: the order
+// in which they come has no influence.
 template <int dim> class NearestFirst {
 public:
   void insert(const Projection<dim> &p) {
-    if (count_ == most && std::abs(p.distance) >= std::abs(all_[most - 1].distance))
+    if (count_ == most && !is_before(p, all_[most - 1]))
       return;
     int k = count_ < most ? count_++ : most - 1;
-    for (; k > 0 && std::abs(all_[k - 1].distance) > std::abs(p.distance); --k)
+    for (; k > 0 && is_before(p, all_[k - 1]); --k)
       all_[k] = all_[k - 1];
     all_[k] = p;
+  }
+  /// True when no place farther than all that have come changes by_direction().
+  bool is_settled() const {
+    return count_ == most || by_direction().count == most_projections<dim>;
   }
   /// The nearest of each direction.
   PointWalls<dim> by_direction() const {
@@ -175,6 +180,11 @@ public:
   }
 
 private:
+  static bool is_before(const Projection<dim> &p, const Projection<dim> &q) {
+    const double a = std::abs(p.distance), b = std::abs(q.distance);
+    return a < b || (a == b && p.face < q.face);
+  }
+
   static constexpr int most = 4 * most_projections<dim>;
   int count_ = 0;
   std::array<Projection<dim>, most> all_;
@@ -197,21 +207,59 @@ template <int dim> void drop_far_faces(PointWalls<dim> &found) {
   found.count = kept;
 }
 
+// Local minima within reach on the faces for which for_each_candidate(visit) calls visit(face).
+template <int dim, class ForEach>
+NearestFirst<dim> local_minima(const Walls<dim> &walls, const Vec<dim> &x, double reach,
+                               ForEach &&for_each_candidate) {
+  NearestFirst<dim> nearest;
+  for_each_candidate([&](int f) {
+    const Foot<dim> foot = foot_on(walls, f, x);
+    if ((x - foot.point).squaredNorm() <= reach * reach && is_local_minimum(walls, f, foot, x))
+      nearest.insert(make_projection(walls, f, foot, x));
+  });
+  return nearest;
+}
+
+template <int dim> PointWalls<dim> projections(const NearestFirst<dim> &nearest) {
+  PointWalls<dim> found = nearest.by_direction();
+  drop_far_faces(found);
+  return found;
+}
+
+// Walls of more faces than this are searched in balls that grow: next to a rough surface the
+// directions that a point can have are found before its whole reach is searched.
+constexpr std::size_t many_faces = 256;
+
 } // namespace
+
+template <int dim>
+PointWalls<dim> project_on_walls(const Walls<dim> &walls, const FaceTree<dim> &tree,
+                                 const Vec<dim> &x, double reach) {
+  const auto within = [&](double radius) {
+    return local_minima(walls, x, radius,
+                        [&](auto &&visit) { tree.for_each_facing(x, radius, visit); });
+  };
+  if (walls.faces.size() > many_faces)
+    for (const double part : {0.25, 0.5})
+      if (const NearestFirst<dim> nearest = within(part * reach); nearest.is_settled())
+        return projections(nearest);
+  return projections(within(reach));
+}
 
 template <int dim>
 PointWalls<dim> project_on_walls(const Walls<dim> &walls, std::span<const int> candidates,
                                  const Vec<dim> &x, double reach) {
-  NearestFirst<dim> nearest;
-  for (const int f : candidates) {
-    const Foot<dim> foot = foot_on(walls, f, x);
-    if ((x - foot.point).squaredNorm() > reach * reach || !is_local_minimum(walls, f, foot, x))
-      continue;
-    nearest.insert(make_projection(walls, f, foot, x));
-  }
-  PointWalls<dim> found = nearest.by_direction();
-  drop_far_faces(found);
-  return found;
+  return projections(local_minima(walls, x, reach, [&](auto &&visit) {
+    std::for_each(candidates.begin(), candidates.end(), visit);
+  }));
+}
+
+template <int dim>
+bool is_near_walls(const Walls<dim> &walls, const FaceTree<dim> &tree, const Vec<dim> &x,
+                   double reach) {
+  return tree.any_near(x, reach, [&](int f) {
+    return (foot_on(walls, f, x).point - x).squaredNorm() <= reach * reach;
+  });
 }
 
 template <int dim> double distance_to_walls(const Walls<dim> &walls, const Vec<dim> &x) {
@@ -222,53 +270,17 @@ template <int dim> double distance_to_walls(const Walls<dim> &walls, const Vec<d
 }
 
 template <int dim>
+bool is_hidden(const Walls<dim> &walls, const FaceTree<dim> &tree, const Vec<dim> &from,
+               const Vec<dim> &to) {
+  return tree.any_along(from, to,
+                        [&](int f) { return is_crossed(walls.corners(walls.faces[f]), from, to); });
+}
+
+template <int dim>
 bool is_hidden(const Walls<dim> &walls, std::span<const int> candidates, const Vec<dim> &from,
                const Vec<dim> &to) {
   return std::any_of(candidates.begin(), candidates.end(),
                      [&](int f) { return is_crossed(walls.corners(walls.faces[f]), from, to); });
-}
-
-namespace {
-
-// Calls visit(cell) for every cell that the face may come within `reach` of.
-template <int dim, class Visit>
-void for_each_cell_near(const Walls<dim> &walls, const WallFace<dim> &f, const Grid<dim> &grid,
-                        double reach, Visit &&visit) {
-  const Corners<dim> corners = walls.corners(f);
-  Vec<dim> low = corners[0], high = corners[0];
-  for (const Vec<dim> &x : corners) {
-    low = low.cwiseMin(x);
-    high = high.cwiseMax(x);
-  }
-  low.array() -= reach;
-  high.array() += reach;
-  if ((high.array() < grid.origin.array()).any() || (low.array() > grid.top().array()).any())
-    return;
-  const double limit = reach + (dim == 2 ? 0.7072 : 0.8661) * grid.cell_size; // half a diagonal
-  const auto first = grid.place(low), last = grid.place(high);
-  grid.for_each_run(first, last, [&](int begin, int end) {
-    for (int c = begin; c <= end; ++c) {
-      const Vec<dim> centre = grid.centre(c);
-      if ((nearest_on_face(corners, centre).point - centre).squaredNorm() <= limit * limit)
-        visit(c);
-    }
-  });
-}
-
-} // namespace
-
-template <int dim>
-void find_near_faces(const Walls<dim> &walls, const Grid<dim> &grid, double reach, FaceGrid &near) {
-  near.start.assign(grid.n_cells() + 1, 0);
-  for (const WallFace<dim> &f : walls.faces)
-    for_each_cell_near(walls, f, grid, reach, [&](int c) { ++near.start[c + 1]; });
-  for (int c = 0; c < grid.n_cells(); ++c)
-    near.start[c + 1] += near.start[c];
-  near.face.resize(near.start.back());
-  near.next.assign(near.start.begin(), near.start.end() - 1);
-  for (int k = 0; k < static_cast<int>(walls.faces.size()); ++k)
-    for_each_cell_near(walls, walls.faces[k], grid, reach,
-                       [&](int c) { near.face[near.next[c]++] = k; });
 }
 
 // --- links --------------------------------------------------------------------------------------
@@ -395,16 +407,22 @@ template <int dim> void link_faces(Walls<dim> &walls) {
 
 template struct Walls<2>;
 template struct Walls<3>;
-template void find_near_faces(const Walls<2> &, const Grid<2> &, double, FaceGrid &);
+template PointWalls<2> project_on_walls(const Walls<2> &, const FaceTree<2> &, const Vec<2> &,
+                                        double);
 template PointWalls<2> project_on_walls(const Walls<2> &, std::span<const int>, const Vec<2> &,
                                         double);
+template bool is_near_walls(const Walls<2> &, const FaceTree<2> &, const Vec<2> &, double);
 template double distance_to_walls(const Walls<2> &, const Vec<2> &);
+template bool is_hidden(const Walls<2> &, const FaceTree<2> &, const Vec<2> &, const Vec<2> &);
 template bool is_hidden(const Walls<2> &, std::span<const int>, const Vec<2> &, const Vec<2> &);
 template void link_faces(Walls<2> &);
-template void find_near_faces(const Walls<3> &, const Grid<3> &, double, FaceGrid &);
+template PointWalls<3> project_on_walls(const Walls<3> &, const FaceTree<3> &, const Vec<3> &,
+                                        double);
 template PointWalls<3> project_on_walls(const Walls<3> &, std::span<const int>, const Vec<3> &,
                                         double);
+template bool is_near_walls(const Walls<3> &, const FaceTree<3> &, const Vec<3> &, double);
 template double distance_to_walls(const Walls<3> &, const Vec<3> &);
+template bool is_hidden(const Walls<3> &, const FaceTree<3> &, const Vec<3> &, const Vec<3> &);
 template bool is_hidden(const Walls<3> &, std::span<const int>, const Vec<3> &, const Vec<3> &);
 template void link_faces(Walls<3> &);
 

@@ -5,7 +5,7 @@
 #pragma once
 
 #include "bridge/base/vec.hpp"
-#include "fluid/neighbours.hpp"
+#include "fluid/face_tree.hpp"
 #include "fluid/wall_face.hpp"
 
 #include <array>
@@ -90,28 +90,31 @@ template <int dim> struct PointWalls {
   auto end() const { return projection.begin() + count; }
 };
 
-/// Which faces come within `reach` of each grid cell.
-struct FaceGrid {
-  std::vector<int> start; // n_cells + 1
-  std::vector<int> face;
-  std::vector<int> next; // while it is filled
-  std::span<const int> near(int cell) const {
-    return {face.data() + start[cell], face.data() + start[cell + 1]};
-  }
-};
+/// Projections of `x` on the walls within `reach`: local minima of the distance over the surface,
+/// nearest first. `tree` is that of the walls.
 template <int dim>
-void find_near_faces(const Walls<dim> &walls, const Grid<dim> &grid, double reach, FaceGrid &near);
+PointWalls<dim> project_on_walls(const Walls<dim> &walls, const FaceTree<dim> &tree,
+                                 const Vec<dim> &x, double reach);
 
-/// Projections of `x` on those of `candidates` within `reach`: local minima of the distance over
-/// the surface, nearest first.
+/// The same by a test of every face in `candidates`.
 template <int dim>
 PointWalls<dim> project_on_walls(const Walls<dim> &walls, std::span<const int> candidates,
                                  const Vec<dim> &x, double reach);
 
+/// True when a face comes within `reach` of `x`.
+template <int dim>
+bool is_near_walls(const Walls<dim> &walls, const FaceTree<dim> &tree, const Vec<dim> &x,
+                   double reach);
+
 /// Distance from `x` to the nearest of all faces [m].
 template <int dim> double distance_to_walls(const Walls<dim> &walls, const Vec<dim> &x);
 
-/// True when the straight line between two points crosses one of the faces.
+/// True when the straight line between two points crosses a wall.
+template <int dim>
+bool is_hidden(const Walls<dim> &walls, const FaceTree<dim> &tree, const Vec<dim> &from,
+               const Vec<dim> &to);
+
+/// The same by a test of every face in `candidates`.
 template <int dim>
 bool is_hidden(const Walls<dim> &walls, std::span<const int> candidates, const Vec<dim> &from,
                const Vec<dim> &to);

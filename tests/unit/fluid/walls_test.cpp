@@ -132,21 +132,6 @@ TEST(Walls, ALineThroughASharedVertexIsHidden) {
   EXPECT_TRUE(is_hidden(wall, every_face(wall), {1, 0}, {-1, 0}));
 }
 
-TEST(Walls, TheGridListsEverySegmentWithinReach) {
-  const Walls<2> walls = polyline({{0.13, 3.9}, {0.31, 0.22}, {2.7, 0.4}, {3.7, 2.2}});
-  const auto x = testing::random_points(400, {4, 4}, 5);
-  const Grid<2> grid = grid_over(testing::points_at(x), 0.5);
-  FaceGrid near;
-  find_near_faces(walls, grid, 0.5, near);
-  for (const Vec<2> &p : x) {
-    const PointWalls<2> from_grid = project_on_walls(walls, near.near(grid.cell(p)), p, 0.5);
-    const PointWalls<2> from_all = project(walls, p, 0.5);
-    ASSERT_EQ(from_grid.count, from_all.count);
-    for (int k = 0; k < from_all.count; ++k)
-      EXPECT_EQ(from_grid.projection[k].point, from_all.projection[k].point);
-  }
-}
-
 TEST(Walls, LinkingJoinsWallsThatShareAnEnd) {
   Walls<2> walls;
   testing::add_polyline(walls, {{0, 1}, {0, 0}}, "left");
