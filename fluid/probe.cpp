@@ -103,8 +103,10 @@ template <int dim> void ProbeOutput<dim>::write(const FluidSolver<dim> &solver, 
     const Vec<dim> x = (1 - t) * params_.from + t * params_.to;
     const Reading<dim> r = read_at(solver, x);
     std::vector<double> row{time};
-    row.insert(row.end(), x.begin(), x.end());
-    row.insert(row.end(), r.velocity.begin(), r.velocity.end());
+    for (const double coordinate : x)
+      row.push_back(coordinate);
+    for (const double component : r.velocity)
+      row.push_back(component);
     row.push_back(r.pressure);
     csv_.row(row);
   }

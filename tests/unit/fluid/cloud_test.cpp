@@ -47,8 +47,9 @@ TEST(SurfaceDepth, InSpaceIsHalfASpacingOnALattice) {
   ASSERT_EQ(frozen.count(PointKind::surface), n * n);
   for (int i = 0; i < frozen.size(); ++i) {
     EXPECT_EQ(frozen.cloud.openness[i], frozen.cloud.kind[i] == PointKind::surface ? 1 : 0);
-    if (frozen.cloud.kind[i] == PointKind::surface)
+    if (frozen.cloud.kind[i] == PointKind::surface) {
       EXPECT_NEAR(frozen.cloud.surface_depth[i], 0.5 * h, 1e-12);
+    }
   }
 }
 
