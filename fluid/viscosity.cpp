@@ -484,6 +484,7 @@ ViscousResult diffuse_with(const Points<dim> &points, const Walls<dim> &walls,
       problem.solution[dim * i + a] = expected[i][a];
   std::vector<Vec<dim>> latest(velocity.size());
   const RheologyParams &law = rheology.params();
+  const double cautious = cautious_relaxation_of(rheology);
   double relaxation = relaxation_of(rheology),
          last_change = std::numeric_limits<double>::infinity();
   for (;;) {
@@ -495,10 +496,13 @@ ViscousResult diffuse_with(const Points<dim> &points, const Walls<dim> &walls,
     if (rheology.is_newtonian() || result.passes == law.picard_passes)
       break;
     const double change = relative_change(problem.solution, problem.previous);
-    if (change < law.picard_tolerance)
+    // a smaller step towards the law's viscosity stands for as much more of the way
+    if (change < law.picard_tolerance * std::min(1.0, relaxation / cautious))
       break;
-    if (change > 0.5 * last_change)
-      relaxation = cautious_relaxation_of(rheology);
+    if (change > 0.9 * last_change && relaxation <= cautious)
+      relaxation = std::max(0.5 * relaxation, 0.25 * cautious);
+    else if (change > 0.5 * last_change)
+      relaxation = std::min(relaxation, cautious);
     last_change = change;
     stiffness = update_viscosity(latest, relaxation);
   }
