@@ -162,7 +162,10 @@ template <int dim> struct FluidParams {
         .at_least(0);
     read("agitation", motion.agitation, "disturbance of the points per unit of strain, in spacings")
         .at_least(0);
-    read("volume_rate", motion.volume_rate, "decay of volume errors, in units of the pace")
+    if (!free_surface) // the container holds the volume: only cells even out
+      motion.volume_rate = 0.1;
+    read("volume_rate", motion.volume_rate,
+         "decay of volume errors, in units of the pace; 0.1 by default without a free surface")
         .at_least(0);
     read("widest_offset", motion.widest_offset,
          "farthest that a point lies from the middle of its cell, in spacings")
