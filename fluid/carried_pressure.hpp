@@ -13,11 +13,11 @@
 // and the next step knows p - beta mu (D u* - theta): without this term the pressure of a creeping
 // flow would take s (width / spacing)^2 steps to build up. Left out
 // by default in a fluid with a free surface, where it threw a film with s = 25 apart (589 points
-// lost; shares of zero at the surface alone are worse), while the thickening fluid behind a gate
-// needs it. It is averaged over a point's surroundings, with the point's viscosity or the harmonic
-// mean of all, whichever is less: a plug that slides on a thin layer answers to its pressure by the
-// layer's viscosity. Source: L. J. P. Timmermans, P. D. Minev, F. N. van de Vosse, Int. J. Numer.
-// Meth. Fluids 22 (1996) 673; J. L. Guermond, J. Shen, Math. Comp. 73 (2004) 1719 (for beta = 1).
+// lost; shares of zero at the surface alone are worse). It is averaged over a point's surroundings,
+// with the point's viscosity or the harmonic mean of all, whichever is less: a plug that slides on
+// a thin layer answers to its pressure by the layer's viscosity. Source: L. J. P. Timmermans, P. D.
+// Minev, F. N. van de Vosse, Int. J. Numer. Meth. Fluids 22 (1996) 673; J. L. Guermond, J. Shen,
+// Math. Comp. 73 (2004) 1719 (for beta = 1).
 #pragma once
 
 #include "fluid/pressure.hpp"

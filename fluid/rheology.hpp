@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: MIT
 // Generalised Newtonian fluids: the dynamic viscosity as a function of the shear rate
 // gamma = sqrt(2 E : E), E the strain rate. A law is one class with `operator()(gamma)`, and
-// `thins()`: where it changes most, its viscosity falls with the shear rate.
+// `thins()`: does its viscosity fall with the shear rate, at low ones where it does both?
 #pragma once
 
 #include "bridge/base/config.hpp"

@@ -41,8 +41,7 @@ template <int dim> void FluidSolver<dim>::begin_step(double dt) {
     assemble_pressure_operators(state.points, cloud_, pressure_params_, problem_);
     report_.rows = problem_.rows;
   });
-  if (state.step == 0 && viscosity_knows_pressure())
-    find_first_pressure();
+  find_first_pressure();
   timer("viscosity", [&] { predict_velocity(); });
   assemble();
 }
@@ -50,17 +49,19 @@ template <int dim> void FluidSolver<dim>::begin_step(double dt) {
 // Where viscosity has to know the last pressure there is none in the first step: without it a stiff
 // fluid at rest gets the whole weight of a step, and what the projection leaves of that.
 template <int dim> void FluidSolver<dim>::find_first_pressure() {
+  if (state.step > 0 || !viscosity_knows_pressure())
+    return;
   constexpr int passes = 2; // more do not settle: each differentiates the last pressure anew
   Points<dim> &points = state.points;
   for (int k = 0; k < passes; ++k) {
     timer("viscosity", [&] { predict_velocity(); });
     assemble();
-    iterate();
+    solve_pressure();
     pressure_gradients(points, cloud_, problem_, points.pressure, points.pressure_gradient);
   }
 }
 
-template <int dim> void FluidSolver<dim>::iterate() {
+template <int dim> void FluidSolver<dim>::solve_pressure() {
   Points<dim> &points = state.points;
   set_wall_velocity(walls, cloud_, pressure_params_, projection_dt_, problem_);
   const SolveResult result = timer("pressure solve", [&] {
@@ -76,9 +77,13 @@ template <int dim> void FluidSolver<dim>::iterate() {
                     state.step + 1, result.iterations, result.residual));
   report_.pressure_iterations += result.iterations;
   ++report_.pressure_solves;
+}
+
+template <int dim> void FluidSolver<dim>::iterate() {
+  solve_pressure();
   timer("loads", [&] {
-    evaluate_tractions(points, walls, cloud_, problem_, points.pressure, viscosity(), quadrature_,
-                       tractions_);
+    evaluate_tractions(state.points, walls, cloud_, problem_, state.points.pressure, viscosity(),
+                       quadrature_, tractions_);
     integrate_nodal_forces(walls, quadrature_, tractions_, nodal_forces_);
   });
 }
@@ -245,7 +250,7 @@ template <int dim> void FluidSolver<dim>::extrapolate_velocity() {
 }
 
 template <int dim> bool FluidSolver<dim>::viscosity_knows_pressure() const {
-  return !params_.rheology.is_inviscid() &&
+  return !params_.rheology.is_inviscid() && !viscosity_is_negligible() &&
          (params_.time_order == 2 ||
           !is_explicit(params_.rheology, params_.density, dt_, params_.spacing));
 }
@@ -268,7 +273,7 @@ template <int dim> void FluidSolver<dim>::push_by_known_forces() {
 // A wave of L spacings would lose (2 pi / L)^2 times this number in the step.
 template <int dim> bool FluidSolver<dim>::viscosity_is_negligible() const {
   return !params_.rheology.is_inviscid() &&
-         viscous_number(params_.rheology, params_.density, projection_dt_, params_.spacing) <
+         viscous_number(params_.rheology, params_.density, dt_, params_.spacing) <
              params_.negligible_viscosity;
 }
 
@@ -340,7 +345,7 @@ template <int dim> void FluidSolver<dim>::assemble() {
       add_carried_pressure(points, cloud_, viscosity(), target_divergence_, carried_, problem_);
     if (params_.holds_tension)
       forget_enclosed_surfaces(cloud_, points);
-    else if (state.step > 0) // the first step has no pressure to judge by
+    else if (state.step > 0) // in the first step there is no pressure of a flow to judge by
       report_.released = release_tension(points, walls, pressure_params_, predicted_,
                                          target_divergence_, projection_dt_, cloud_, problem_);
   });

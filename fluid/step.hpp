@@ -89,6 +89,7 @@ private:
   bool viscosity_is_negligible() const;
   bool viscosity_knows_pressure() const;
   void find_first_pressure();
+  void solve_pressure();
   void predict_velocity();
   bool keeps_stiff_pressure() const;
   void take_back_push();

@@ -141,7 +141,7 @@ void set_wall_viscosity(const Points<dim> &points, const Cloud<dim> &cloud,
 /// stress, where 1 / mu is proportional to the shear rate, and for a power law of exponent 2, where
 /// mu is. The arithmetic mean would stiffen what lies next to a plug. Derived here.
 struct HarmonicMean {
-  double operator()(double a, double b) const { return 2 * a * b / (a + b); }
+  double operator()(double a, double b) const { return a + b > 0 ? 2 * a * b / (a + b) : 0.0; }
 };
 struct ArithmeticMean {
   double operator()(double a, double b) const { return 0.5 * (a + b); }

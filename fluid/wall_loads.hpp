@@ -2,7 +2,8 @@
 // Traction of the fluid on the walls, integrated into nodal forces. At each quadrature point of a
 // face the pressure is a positive average of first-order Taylor expansions from the points in
 // sight on the wetted side, p(x) = sum w_i (p_i + grad p_i . (x - x_i)): exact for linear pressure,
-// and affine in the wall velocity. Faces are one-sided; nothing is averaged round a corner.
+// and affine in the wall velocity. Faces are one-sided; nothing is averaged round a corner of
+// more than 30 degrees.
 //
 // Where only the sum over all walls is asked for, narrow faces (less than a quarter of a spacing)
 // have one quadrature point on pieces no longer than a spacing, and those in one small cube share

@@ -46,8 +46,11 @@ template <int dim> struct WallParams {
     read("velocity_m_s", velocity, "of a wall that slides along itself, as a lid does");
     auto shares = read("velocity_shares", velocity_shares,
                        "of velocity_m_s at each of points_m, linear in between; none: all of it");
-    shares.check(velocity_shares.empty() || velocity_shares.size() == points.size(),
-                 "one share for each of the points_m");
+    shares
+        .check(velocity_shares.empty() || velocity_shares.size() == points.size(),
+               fmt::format("has {} shares for {} points_m; give one for each",
+                           velocity_shares.size(), points.size()))
+        .check(velocity_shares.empty() || !velocity.isZero(), "needs velocity_m_s");
     auto law = read("displacement_m", displacement,
                     "formulas in x, y (z) and t of a wall that moves by a law of its own");
     const std::string problem = problem_of<dim>(displacement);

@@ -108,7 +108,7 @@ TEST(FaceTree, AsksFewOfManyFaces) {
   };
   const auto coarse = asked(16), fine = asked(128);
   EXPECT_LT(fine[0], 3 * coarse[0]);
-  EXPECT_LT(fine[1], 16 * coarse[1]); // as many as a line is long
+  EXPECT_LT(fine[1], 3 * coarse[1]);
 }
 
 } // namespace

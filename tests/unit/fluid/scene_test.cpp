@@ -71,6 +71,7 @@ TEST(Scene, AWallSlidesWithTheSharesOfItsVelocity) {
   const std::string message =
       message_of([&] { scene_of(replaced(belt, "[0, 1, 0.5, 0]", "[0, 1, 0]")); });
   EXPECT_TRUE(contains(message, "velocity_shares")) << message;
+  EXPECT_TRUE(contains(message, "3 shares for 4 points_m")) << message;
 }
 
 TEST(Scene, RefusesWaterBeyondTheOutlet) {
