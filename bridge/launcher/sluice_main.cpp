@@ -189,7 +189,17 @@ std::map<std::string, fs::path> restart_files_of(const std::vector<Participant> 
   return last_restart_files(fs::absolute(options.restart), names);
 }
 
+// [parameters] are read by the scripts of a case, which write what follows from them.
+void refuse_parameters(const Options &options) {
+  for (const std::string &text : options.overrides)
+    check(!text.starts_with("parameters."),
+          "--set {}: no solver reads [parameters]; use cases/run, which prepares the case from it, "
+          "or the case's own prepare",
+          text);
+}
+
 int run(const Options &options) {
+  refuse_parameters(options);
   const Config config = Config::load(options.case_file, options.overrides);
   const Case scene = read_case(config);
   const auto participants = participants_of(config, options.programs);
@@ -235,6 +245,7 @@ int run(const Options &options) {
 }
 
 int check_case(const Options &options) {
+  refuse_parameters(options);
   const Config config = Config::load(options.case_file, options.overrides);
   read_case(config);
   const auto participants = participants_of(config, options.programs);

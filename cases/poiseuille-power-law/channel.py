@@ -10,6 +10,8 @@ unknowns follow from u(1) = 1, no net flux and integrals in closed form:
 
 import numpy as np
 
+from run_folder import RunError
+
 TOLERANCE = 1e-13
 
 
@@ -68,5 +70,8 @@ def error(run, exponent, points):
     The flow is steady by then, the points are not: one output alone is off by half to twice of this.
     """
     line = run.series(f"{name_of(exponent, points)}/probe_middle.csv")
+    if len(line["time_s"]) == 0:
+        raise RunError(f"{run.path}: no profile was written; the run ended before its first output at "
+                       "case.output_interval_s: let it go on longer")
     late = line["time_s"] > 0.5 * line["time_s"].max()
     return float(np.sqrt(np.mean((line["u_m_s"][late] - exact_velocity(exponent, line["y_m"][late]))**2)))

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from run_folder import RunError
 from vtk_files import read_cloud
 
 SERIES = 60     # odd terms in each direction; the rest is below 1e-6 of the pressure
@@ -46,6 +47,9 @@ def motions(run):
         now = (u.sum(axis=0), angular_momentum(cloud.position, u), float((u**2).sum()))
         first = first or (np.hypot(*u.T).sum(), now[1], now[2])
         found.append(Motion(time, now[0] / first[0], now[1] / first[1], now[2] / first[2]))
+    if len(found) < 2 or found[-1].time == 0:
+        raise RunError(f"{run.path}: nothing was written after the start; the run ended before its "
+                       "first output at case.output_interval_s: let it go on longer")
     return found
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from compare import Curve
-from run_folder import read_columns
+from run_folder import RunError, read_columns
 from vtk_files import read_cloud
 
 REFERENCE = Path(__file__).resolve().parent / "reference/powerlaw_gravity_current_2d.csv"
@@ -116,4 +116,7 @@ def front(run, current):
 def fitted_exponent(current, curve):
     """Slope of log(front) over log(time of the law) once the front has settled."""
     later = curve.value > SETTLED * current.front_start_m
+    if np.count_nonzero(later) < 2:
+        raise RunError(f"the front has not come to {SETTLED:g} times its start twice: the run is too short for its "
+                       "exponent, let it go on longer (case.end_time_s)")
     return float(np.polyfit(np.log(FIRST_TIME + curve.time[later]), np.log(curve.value[later]), 1)[0])
