@@ -62,6 +62,7 @@ template <int dim> struct FluidParams {
   double gradient_guard = 20;
   double noise_damping = 1;
   bool remember_cells = true;
+  bool record_wall_force = true;
   double negligible_viscosity = 1e-5;
   MotionParams motion;
   Rheology rheology; // from table [fluid.rheology] and `viscosity`
@@ -154,6 +155,8 @@ template <int dim> struct FluidParams {
         .at_least(0);
     read("remember_cells", remember_cells,
          "false: all Voronoi cells are cut anew in every step, with the same result");
+    read("record_wall_force", record_wall_force,
+         "false: wall_force in fluid.csv is nan, and loads are those of the coupled walls alone");
     read("negligible_viscosity", negligible_viscosity,
          "time step times kinematic viscosity over spacing^2 below which viscosity is left out")
         .at_least(0)

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <limits>
 #include <nlohmann/json.hpp>
 
 namespace sluice::fluid {
@@ -90,11 +91,14 @@ void History<dim>::record_loads(const FluidSolver<dim> &solver,
 }
 
 template <int dim> Vec<dim> History<dim>::force_on_all_walls(const FluidSolver<dim> &solver) {
+  if (!solver.params().record_wall_force)
+    return Vec<dim>::Constant(std::numeric_limits<double>::quiet_NaN());
   const Points<dim> &points = solver.state.points;
   build_wall_quadrature(points, solver.walls, solver.cloud(), WallPart::all, all_walls_);
   evaluate_tractions(points, solver.walls, solver.cloud(), solver.problem(), points.pressure,
                      solver.viscosity(), all_walls_, all_tractions_);
-  return integrate_resultant(all_walls_, all_tractions_).force;
+  return integrate_resultant(all_walls_, all_tractions_).force -
+         solver.report().contact_impulse / solver.dt();
 }
 
 template <int dim> double History<dim>::energy_gain(const Integrals<dim> &now) const {
@@ -128,8 +132,7 @@ void History<dim>::record(const FluidSolver<dim> &solver, const bridge::Interfac
                           double time) {
   record_loads(solver, loads, time);
   const Integrals<dim> now = integrate(solver);
-  const Vec<dim> wall_force =
-      force_on_all_walls(solver) - solver.report().contact_impulse / solver.dt();
+  const Vec<dim> wall_force = force_on_all_walls(solver);
   outlet_energy_ = solver.outlet_energy();
   update_extremes(solver, now);
   const double spacing = solver.params().spacing;

@@ -37,7 +37,7 @@ private:
                     double time);
   void write_fields(const FluidSolver<dim> &solver, double time);
   void write_state_file(const FluidSolver<dim> &solver, double time) const;
-  Vec<dim> force_on_all_walls(const FluidSolver<dim> &solver); // without contact [N]
+  Vec<dim> force_on_all_walls(const FluidSolver<dim> &solver); // contact included [N]
   double energy_gain(const Integrals<dim> &now) const;         // since the start [J]
   void update_extremes(const FluidSolver<dim> &solver, const Integrals<dim> &now);
 
