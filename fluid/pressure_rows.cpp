@@ -119,8 +119,9 @@ Vec<dim> renormalising_skew(const Stencil<dim> &s, const Points<dim> &points,
 }
 
 /// Blends `row` with as much of `other`, whose signs pass the guard, as it takes to pass it too,
-/// to 1/64. With N and P the sums of negative and positive weights, N - guard P is convex (for a guard above 1: concave) in the
-/// share: it has one zero. Both rows are consistent, and so is what lies between. Derived here.
+/// to 1/64. With N and P the sums of negative and positive weights, N - guard P is convex in the
+/// share (for a guard above 1 concave): it has one zero. Both rows are consistent, and so is what
+/// lies between. Derived here.
 template <int dim> void blend_until_signs_pass(const Row<dim> &other, double guard, Row<dim> &row) {
   const auto blend = [](double share, double a, double b) { return (1 - share) * a + share * b; };
   const auto passes = [&](double share) {

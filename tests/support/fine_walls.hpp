@@ -46,18 +46,14 @@ inline double hill(double height, double x, double y) {
   return height * std::sin(9 * x) * std::cos(7 * y);
 }
 
-/// A sheet of 2 n^2 triangles over [-1, 1]^2, open all round, seen from above.
-inline Walls<3> hills(int n, double height, double jitter) {
-  Noise noise(2);
+/// A sheet of 2 n^2 triangles, open all round, whose vertex (i, j) of (n + 1)^2 is at place(i, j).
+template <class Place> Walls<3> sheet_of(int n, Place &&place) {
   Walls<3> sheet;
-  sheet.names = {"hills"};
+  sheet.names = {"sheet"};
   sheet.slip = {Slip::none};
   for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i) {
-      const double x = 2.0 * i / n - 1, y = 2.0 * j / n - 1;
-      sheet.position.push_back(Vec<3>(x, y, hill(height, x, y)) +
-                               2.0 / n * jitter * noise.vector<3>());
-    }
+    for (int i = 0; i <= n; ++i)
+      sheet.position.push_back(place(i, j));
   sheet.velocity.assign(sheet.position.size(), Vec<3>::Zero());
   for (int j = 0; j < n; ++j)
     for (int i = 0; i < n; ++i) {
@@ -67,6 +63,15 @@ inline Walls<3> hills(int n, double height, double jitter) {
     }
   link_faces(sheet);
   return sheet;
+}
+
+/// A sheet over [-1, 1]^2, seen from above; vertices are displaced by up to `jitter` of a side.
+inline Walls<3> hills(int n, double height, double jitter) {
+  Noise noise(2);
+  return sheet_of(n, [&](int i, int j) -> Vec<3> {
+    const double x = 2.0 * i / n - 1, y = 2.0 * j / n - 1;
+    return Vec<3>(x, y, hill(height, x, y)) + 2.0 / n * jitter * noise.vector<3>();
+  });
 }
 
 } // namespace sluice::fluid::testing

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: MIT
 #include "fluid/neighbours.hpp"
+#include "tests/support/fine_walls.hpp"
 #include "tests/support/fluid_cases.hpp"
 
 #include <gtest/gtest.h>
@@ -63,22 +64,10 @@ TEST(Neighbours, HiddenOnesAreRemovedOnBothSidesOfAPlate) {
 
 // A wavy sheet of triangles that are finer than the spacing, with points on both sides of it.
 Walls<3> wavy_sheet(int n) {
-  Walls<3> sheet;
-  sheet.names = {"sheet"};
-  sheet.slip = {Slip::none};
-  for (int j = 0; j <= n; ++j)
-    for (int i = 0; i <= n; ++i)
-      sheet.position.emplace_back(double(i) / n, double(j) / n,
-                                  0.3 + 0.05 * std::sin(9.0 * i / n) * std::cos(7.0 * j / n));
-  sheet.velocity.assign(sheet.position.size(), Vec<3>::Zero());
-  for (int j = 0; j < n; ++j)
-    for (int i = 0; i < n; ++i) {
-      const int a = j * (n + 1) + i, b = a + 1, c = b + n + 1, d = a + n + 1;
-      for (const std::array<int, 3> &corners : {std::array{a, b, c}, std::array{a, c, d}})
-        sheet.faces.push_back({corners, 0, static_cast<int>(sheet.faces.size())});
-    }
-  link_faces(sheet);
-  return sheet;
+  return testing::sheet_of(n, [&](int i, int j) {
+    const double x = double(i) / n, y = double(j) / n;
+    return Vec<3>(x, y, 0.3 + testing::hill(0.05, x, y));
+  });
 }
 
 TEST(Neighbours, ThoseInSightOfAFineSurfaceAreThoseOfATestOfEveryPair) {

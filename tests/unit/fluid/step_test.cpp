@@ -102,7 +102,8 @@ points_m = [[0, 0], [1, 0], [1, 1], [0, 1], [0, 0]]
 )toml";
 
 // By Richardson's ratio of three steps. Below 0.01 the motion of the points is no longer what
-// decides: each step re-projects, which costs 5e-6 of the energy (fluid/README.md).
+// decides: each step re-projects, which costs 5e-6 of the energy (fluid/README.md). At 40 points
+// per side: with half as many the order is 1.71, as guarded rows change their form on the way.
 TEST(Step, IsOfSecondOrderInTimeWhenAsked) {
   std::array<double, 3> energy;
   for (int level = 0; level < 3; ++level) {
